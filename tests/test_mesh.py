@@ -357,8 +357,8 @@ def test_a_cell_with_an_unknown_node_is_refused(tmp_path, capfd):
     path = write_lines(tmp_path / "bad.msh", PLUS, PLUS_GROUPS)
     text = path.read_text()
     assert "\n1 1 2 \n" in text
-    path.write_text(text.replace("\n1 1 2 \n", "\n1 1 -3 \n"))
-    assert_input_error(path, "node", capfd)
+    path.write_text(text.replace("\n1 1 2 \n", "\n1 1 99 \n"))
+    assert_input_error(path, "gmsh reports 'Unknown node 99 in element", capfd)
 
 
 def test_three_tows_at_a_crossing_are_refused(tmp_path, capfd):

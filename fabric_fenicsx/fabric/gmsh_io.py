@@ -175,7 +175,8 @@ def _group_entities(gmsh: Any, path: Path) -> dict[str, Integers]:
     both = np.intersect1d(entities["warp"], entities["weft"])
     if len(both):
         raise InputError(
-            f"{path}: groups 'warp' and 'weft' share {len(both)} of their curves; a curve is of one family"
+            f"{path}: groups 'warp' and 'weft' share {len(both)} of their curves; "
+            "a curve of one family is allowed"
         )
     return entities
 
