@@ -1,0 +1,1 @@
+"""What a run leaves behind: ParaView time series and pictures, from plain arrays on one rank."""

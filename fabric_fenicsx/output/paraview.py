@@ -1,0 +1,216 @@
+"""Time series for ParaView: one file of tows and one of crossings a step, and their collections.
+
+Points stand at the reference place and carry `displacement`, for the filter Warp By Vector. A
+collection (.pvd) only ever names files that are complete, and is replaced in one go: a run that is
+killed at any moment leaves a series that opens.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import numpy.typing as npt
+from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints
+from vtkmodules.vtkCommonDataModel import VTK_LINE, VTK_VERTEX, vtkCellArray, vtkUnstructuredGrid
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+from fabric_fenicsx.errors import InputError
+from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.output.snapshot import Snapshot
+
+__all__ = ["TimeSeries"]
+
+COMPONENTS = {
+    "displacement": ("x", "y", "z"),
+    "section_forces": ("N1", "N2", "N3"),
+    "section_moments": ("M1", "M2", "M3"),
+}
+
+
+class TimeSeries:
+    """A folder with `tows.pvd` and `crossings.pvd` and the files of their steps.
+
+    `tows_*.vtu` has at the points displacement [mm], the directors d1, d2, d3 and contact_pressure
+    [N/mm]; in the cells section_forces N1, N2, N3 [N], section_moments M1, M2, M3 [N mm], tow and
+    family (0 warp, 1 weft). `crossings_*.vtu` has displacement [mm], shear_angle_deg, angle_deg
+    (90 less the shear angle) and moment [N mm]; a net without crossings writes none.
+
+    Without `resume` the folder starts anew: the steps of an earlier series in it are removed.
+
+    Args:
+        folder: where the files go; made if it is not there.
+        net: the net that every snapshot belongs to.
+        resume: go on with the series that the folder holds.
+        until: with `resume`, the last time to keep [s]; later steps are removed.
+
+    Raises:
+        InputError: a collection to be resumed cannot be read.
+    """
+
+    def __init__(
+        self, folder: str | Path, net: Net, *, resume: bool = False, until: float = math.inf
+    ) -> None:
+        self._folder = Path(folder)
+        self._net = net
+        self._grids = {"tows": _grid(net.points, net.cells, VTK_LINE)}
+        if len(net.crossings):
+            places = net.points[net.crossings].mean(axis=1)
+            numbers = np.arange(len(places))[:, None]
+            self._grids["crossings"] = _grid(places, numbers, VTK_VERTEX)
+
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._steps = self._kept(until) if resume else {}
+        for series in self._grids:
+            self._write_collection(series)
+        kept = {self._file(series, n).name for series in self._grids for n in self._steps}
+        for path in list(self._folder.iterdir()):
+            ours = re.fullmatch(r"(tows|crossings)(_\d{5,}\.vtu(\.part)?|\.pvd\.part)", path.name)
+            if ours and path.name not in kept:
+                path.unlink()
+        if "crossings" not in self._grids:
+            (self._folder / "crossings.pvd").unlink(missing_ok=True)
+
+    @property
+    def times(self) -> list[float]:
+        """Times of the steps in the series [s]."""
+        return list(self._steps.values())
+
+    def add(self, snapshot: Snapshot) -> None:
+        """Write one step and name it in the collections.
+
+        Args:
+            snapshot: the step; its time lies after that of the last one.
+
+        Raises:
+            ValueError: an array has not the shape that the net asks for, or time runs backwards.
+            OSError: a file could not be written.
+        """
+        snapshot.check(self._net)
+        if self._steps and snapshot.time <= self.times[-1]:
+            raise ValueError(
+                f"snapshot: time {snapshot.time:.12g} s is not after {self.times[-1]:.12g} s,"
+                f" the last step in {self._folder}"
+            )
+        number = max(self._steps, default=-1) + 1
+        for series, grid in self._grids.items():
+            step = vtkUnstructuredGrid()
+            step.ShallowCopy(grid)  # shares points and cells
+            if series == "tows":
+                _add_tows(step, self._net, snapshot)
+            else:
+                _add_crossings(step, self._net, snapshot)
+            step.GetFieldData().AddArray(_array("TimeValue", np.array([snapshot.time])))
+            _write_grid(step, self._file(series, number))
+        self._steps[number] = float(snapshot.time)
+        for series in self._grids:
+            self._write_collection(series)
+
+    def _file(self, series: str, number: int) -> Path:
+        return self._folder / f"{series}_{number:05d}.vtu"
+
+    def _kept(self, until: float) -> dict[int, float]:
+        """Number and time of the steps that every collection names, up to a time."""
+        listed = [_read_collection(self._folder / f"{series}.pvd") for series in self._grids]
+        return {
+            number: time
+            for number, time in sorted(listed[0].items())
+            if time <= until + 1e-12 * abs(until)
+            and all(number in steps for steps in listed)
+            and all(self._file(series, number).exists() for series in self._grids)
+        }
+
+    def _write_collection(self, series: str) -> None:
+        root = ET.Element("VTKFile", type="Collection", version="0.1")
+        collection = ET.SubElement(root, "Collection")
+        for number, time in self._steps.items():
+            attributes = {"timestep": repr(time), "part": "0"}
+            attributes["file"] = self._file(series, number).name
+            ET.SubElement(collection, "DataSet", attributes)
+        ET.indent(root)
+        path = self._folder / f"{series}.pvd"
+        unfinished = path.with_name(path.name + ".part")
+        ET.ElementTree(root).write(unfinished, encoding="utf-8", xml_declaration=True)
+        os.replace(unfinished, path)
+
+
+def _read_collection(path: Path) -> dict[int, float]:
+    """Number and time of the steps that a collection names; nothing if there is no such file."""
+    if not path.exists():
+        return {}
+    steps = {}
+    try:
+        for entry in ET.parse(path).iter("DataSet"):
+            number = re.fullmatch(rf"{path.stem}_(\d+)\.vtu", entry.attrib["file"])
+            if number:
+                steps[int(number[1])] = float(entry.attrib["timestep"])
+    except (ET.ParseError, KeyError, ValueError) as error:
+        raise InputError(f"{path}: not a collection that can be resumed: {error}") from None
+    return steps
+
+
+def _grid(
+    points: npt.NDArray[np.float64], cells: npt.NDArray[np.int64], kind: int
+) -> vtkUnstructuredGrid:
+    """A grid of cells of one kind, points (n, 3), cells (m, points of a cell)."""
+    count, size = cells.shape
+    places = vtkPoints()
+    places.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
+    offsets = np.arange(0, count * size + 1, size, dtype=np.int64)
+    numbers = np.ascontiguousarray(cells, dtype=np.int64).ravel()
+    array = vtkCellArray()
+    array.SetData(
+        numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(numbers, deep=True)
+    )
+    grid = vtkUnstructuredGrid()
+    grid.SetPoints(places)
+    grid.SetCells(kind, array)
+    return grid
+
+
+def _array(name: str, values: npt.NDArray[np.float64] | npt.NDArray[np.int64]) -> vtkDataArray:
+    array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
+    array.SetName(name)
+    for i, component in enumerate(COMPONENTS.get(name, ())):
+        array.SetComponentName(i, component)
+    return array
+
+
+def _add_tows(grid: vtkUnstructuredGrid, net: Net, snapshot: Snapshot) -> None:
+    at_points, in_cells = grid.GetPointData(), grid.GetCellData()
+    at_points.AddArray(_array("displacement", snapshot.displacement))
+    for i in range(3):
+        at_points.AddArray(_array(f"d{i + 1}", snapshot.directors[:, i]))
+    at_points.AddArray(_array("contact_pressure", snapshot.contact_pressure))
+    in_cells.AddArray(_array("section_forces", snapshot.section_forces))
+    in_cells.AddArray(_array("section_moments", snapshot.section_moments))
+    in_cells.AddArray(_array("tow", net.cell_tow))
+    in_cells.AddArray(_array("family", net.tow_family[net.cell_tow]))
+
+
+def _add_crossings(grid: vtkUnstructuredGrid, net: Net, snapshot: Snapshot) -> None:
+    shear = np.degrees(snapshot.shear_angle)
+    at_points = grid.GetPointData()
+    displacement = snapshot.displacement[net.crossings].mean(axis=1)
+    at_points.AddArray(_array("displacement", displacement))
+    at_points.AddArray(_array("shear_angle_deg", shear))
+    at_points.AddArray(_array("angle_deg", 90.0 - shear))
+    at_points.AddArray(_array("moment", snapshot.crossing_moment))
+
+
+def _write_grid(grid: vtkUnstructuredGrid, path: Path) -> None:
+    unfinished = path.with_name(path.name + ".part")
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(str(unfinished))
+    writer.SetInputData(grid)
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressorTypeToLZ4()  # ten times as fast as zlib, files twice as large
+    if writer.Write() != 1 or not unfinished.exists():
+        raise OSError(f"{path}: could not be written")
+    os.replace(unfinished, path)
