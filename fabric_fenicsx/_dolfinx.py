@@ -1,0 +1,216 @@
+"""The one place that knows which dolfinx is installed (0.5 to 0.11).
+
+It speaks the newest meaning; what an older release lacks is supplied here, found by its features
+rather than by its version. Nothing else in the package asks for a version.
+
+Offered:
+    interval_mesh: a mesh of two-node cells from arrays, on any communicator.
+    lagrange, constants_per_cell: blocked function spaces.
+    constant: a scalar or vector that a form reads at assembly.
+    atan2: the two-argument arc tangent of UFL.
+    compile_form: UFL to machine code, once for all ranks.
+    add_vector, add_matrix: a compiled form's contribution to an array or a matrix.
+    cell_scalar: the integral of a compiled functional over this rank's own cells.
+    cell_vertices, cell_dofs, input_nodes, input_cells: the numbering maps.
+"""
+
+from __future__ import annotations
+
+import inspect
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import perf_counter
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import basix
+import dolfinx
+import dolfinx.fem.petsc
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import GhostMode, create_mesh
+
+__all__ = [
+    "add_matrix",
+    "add_vector",
+    "atan2",
+    "cell_dofs",
+    "cell_scalar",
+    "compile_form",
+    "compile_seconds",
+    "constant",
+    "constants_per_cell",
+    "input_cells",
+    "input_nodes",
+    "interval_mesh",
+    "lagrange",
+    "version",
+]
+
+version: str = dolfinx.__version__
+
+atan2 = getattr(ufl, "atan2", None) or ufl.atan_2
+
+_BASIX_UFL = hasattr(ufl, "__version__") and not hasattr(ufl, "FiniteElement")
+_FORM_OPTIONS = inspect.signature(fem.form).parameters
+_JIT_OPTIONS = {"timeout": 600, "cffi_extra_compile_args": ["-O2", "-g0"]}
+
+# Seconds that this process has spent in the form compiler, for the run's report.
+compile_seconds: list[float] = [0.0]
+
+
+@contextmanager
+def _compiling() -> Iterator[None]:
+    """Count the seconds, and keep the C compiler's command lines off the terminal."""
+    start = perf_counter()
+    logging.disable(logging.INFO)
+    try:
+        yield
+    finally:
+        logging.disable(logging.NOTSET)
+        compile_seconds[0] += perf_counter() - start
+
+
+def interval_mesh(
+    comm: MPI.Comm, points: npt.NDArray[np.float64], cells: npt.NDArray[np.int64]
+) -> Any:
+    """A mesh of two-node intervals, every one of them given on rank 0.
+
+    Args:
+        comm: the communicator to distribute it on.
+        points: node positions, shape (n_nodes, gdim); read on rank 0 only.
+        cells: node numbers, shape (n_cells, 2); read on rank 0 only.
+
+    Returns:
+        The dolfinx mesh. Facets that two ranks share are ghosted, or an interior node would
+        look like a tow end.
+    """
+    gdim = points.shape[1]
+    if comm.rank != 0:
+        points = np.zeros((0, gdim))
+        cells = np.zeros((0, 2), dtype=np.int64)
+    cells = np.ascontiguousarray(cells, dtype=np.int64)
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    if _BASIX_UFL:
+        element = basix.ufl.element("Lagrange", "interval", 1, shape=(gdim,))
+        partitioner = dolfinx.cpp.mesh.create_cell_partitioner(GhostMode.shared_facet)
+        arguments = list(inspect.signature(create_mesh).parameters)
+        if arguments.index("x") < arguments.index("e" if "e" in arguments else "domain"):
+            return create_mesh(comm, cells, points, element, partitioner=partitioner)
+        return create_mesh(comm, cells, element, points, partitioner=partitioner)
+    # "equispaced": with any other variant the ranks disagree about the form's signature.
+    element = ufl.VectorElement(
+        "Lagrange", ufl.Cell("interval", geometric_dimension=gdim), 1, dim=gdim,
+        variant="equispaced",
+    )  # fmt: skip
+    return create_mesh(comm, cells, points, ufl.Mesh(element), ghost_mode=GhostMode.shared_facet)
+
+
+def _space(mesh: Any, family: str, degree: int, size: int) -> Any:
+    with _compiling():
+        if hasattr(fem, "functionspace"):
+            element = (family, degree, (size,)) if size > 1 else (family, degree)
+            return fem.functionspace(mesh, element)
+        if size > 1:
+            return fem.VectorFunctionSpace(mesh, (family, degree), dim=size)
+        return fem.FunctionSpace(mesh, (family, degree))
+
+
+def lagrange(mesh: Any, size: int) -> Any:
+    """Continuous piecewise linear fields with ``size`` components, blocked by node."""
+    return _space(mesh, "Lagrange", 1, size)
+
+
+def constants_per_cell(mesh: Any, size: int) -> Any:
+    """Fields with ``size`` components that are constant in each cell."""
+    return _space(mesh, "DG", 0, size)
+
+
+def constant(mesh: Any, value: float | tuple[float, ...]) -> Any:
+    """A number or vector that forms on ``mesh`` read when assembled; set ``.value`` to change it."""
+    return fem.Constant(
+        mesh,
+        PETSc.ScalarType(value)
+        if np.isscalar(value)
+        else np.asarray(value, dtype=PETSc.ScalarType),
+    )
+
+
+def compile_form(form: ufl.Form, comm: MPI.Comm, *, here: bool = True) -> Any:
+    """Compile a form; rank 0 first, the others read its result from the cache.
+
+    Args:
+        form: the UFL form, on a mesh of ``comm`` or on one of each rank's own.
+        comm: the communicator of the whole run; the call is collective over it.
+        here: whether this rank has cells of the form's mesh (else it only waits).
+
+    Returns:
+        The compiled form, or None where ``here`` is false.
+    """
+    options = "jit_options" if "jit_options" in _FORM_OPTIONS else "jit_params"
+
+    def compiled() -> Any:
+        return fem.form(form, **{options: dict(_JIT_OPTIONS)})
+
+    result = None
+    own_mesh = here and form.ufl_domain().ufl_cargo().comm.size == 1
+    with _compiling():
+        if not any(comm.allgather(own_mesh)):
+            return compiled()
+        # Each rank's connectors are a mesh of its own: take turns, or they would all compile.
+        first = min(rank for rank, has in enumerate(comm.allgather(here)) if has)
+        if here and comm.rank == first:
+            result = compiled()
+        comm.barrier()
+        if here and result is None:
+            result = compiled()
+    return result
+
+
+def add_vector(array: npt.NDArray[np.float64], form: Any) -> None:
+    """Add a linear form to an array over this rank's own and ghost dofs."""
+    fem.assemble_vector(array, form)
+
+
+def add_matrix(matrix: PETSc.Mat, form: Any) -> None:
+    """Add a bilinear form to a matrix through the matrix's local-to-global maps."""
+    fem.petsc.assemble_matrix(matrix, form)
+
+
+def cell_scalar(form: Any) -> float:
+    """Integral of a functional over this rank's own cells (sum over ranks for the whole)."""
+    return float(fem.assemble_scalar(form))
+
+
+def cell_dofs(space: Any) -> npt.NDArray[np.int64]:
+    """Local block number of each cell's dofs, shape (n_local_cells, dofs_per_cell)."""
+    table = space.dofmap.list
+    array = table.array if hasattr(table, "array") else table
+    count = local_cells(space.mesh)
+    return np.asarray(array, dtype=np.int64).reshape(count, -1)
+
+
+def local_cells(mesh: Any) -> int:
+    """Number of this rank's cells, ghosts included."""
+    cells = mesh.topology.index_map(mesh.topology.dim)
+    return int(cells.size_local + cells.num_ghosts)
+
+
+def input_nodes(mesh: Any) -> npt.NDArray[np.int64]:
+    """Node numbers, as given to interval_mesh, of each local cell, shape (n_local_cells, 2)."""
+    table = mesh.geometry.dofmap
+    array = table.array if hasattr(table, "array") else table
+    local = np.asarray(array, dtype=np.int64).reshape(local_cells(mesh), 2)
+    return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[local]
+
+
+def input_cells(mesh: Any) -> npt.NDArray[np.int64]:
+    """Cell number, as given to interval_mesh, of each local cell, shape (n_local_cells,)."""
+    topology = mesh.topology
+    original = topology.original_cell_index
+    return np.asarray(original, dtype=np.int64)[: local_cells(mesh)]

@@ -1,0 +1,290 @@
+"""A net as dolfinx fields: the tow mesh, the connector mesh, and the maps between their numberings.
+
+Three numberings meet here: nodes of the net (the same on any number of ranks, and what is written
+to disk), local blocks of this rank's dolfinx fields, and global blocks (rows of the matrix / 6).
+The connectors of a rank are a mesh of its own (MPI_COMM_SELF): their dofs are not unknowns, they
+are copies of the tows' dofs, filled and emptied through global block numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx.fem import Function
+from scipy import sparse
+
+from .. import _dolfinx
+from ..fabric.net import Net
+from ..mechanics.fields import ConnectorFields, TowFields
+from .update import advance
+
+__all__ = ["BLOCK", "Discretisation"]
+
+#: Unknowns per node: three displacements, three rotations.
+BLOCK = 6
+
+Array = npt.NDArray[np.float64]
+
+
+class Discretisation:
+    """Function spaces, fields and numbering of a net on a communicator.
+
+    Args:
+        net: the whole net, on every rank.
+        stiffness: section stiffnesses per cell of the net, shape (n_cells, 6) [N, N mm²].
+        mass: mass and three rotary inertias per cell, shape (n_cells, 4) [tonne/mm, tonne mm].
+        comm: communicator of the run.
+
+    Attributes:
+        tows: fields on the tow mesh.
+        connectors: fields on this rank's connectors; None where it has none.
+        node_block: global block of each node of the net, shape (n_nodes,).
+        local_nodes: net node of each local block, owned blocks first.
+        owned: number of blocks that this rank owns.
+        local_crossings: crossings of the net that this rank assembles.
+    """
+
+    def __init__(self, net: Net, stiffness: Array, mass: Array, comm: MPI.Comm) -> None:
+        self.net, self.comm = net, comm
+        mesh = _dolfinx.interval_mesh(comm, net.points, net.cells)
+        space = _dolfinx.lagrange(mesh, BLOCK)
+        self._number(mesh, space)
+
+        nodes = {size: _dolfinx.lagrange(mesh, size) for size in (3, 4)}
+        cells = {size: _dolfinx.constants_per_cell(mesh, size) for size in (3, 4, 6)}
+        self.forces_space = cells[6]
+        self.tows = TowFields(
+            mesh=mesh,
+            space=space,
+            w=Function(space),
+            u_n=Function(nodes[3]),
+            q_n=Function(nodes[4]),
+            normal=self.cell_field(cells[3], net.normals),
+            stiffness=self.cell_field(cells[6], stiffness),
+            mass=self.cell_field(cells[4], mass),
+            section_forces=Function(cells[6]),
+            strain_n=Function(cells[6]),
+            rate_star=Function(space),
+            acceleration_star=Function(space),
+        )
+        self.connectors = self._connect()
+        for fields in (self.tows, self.connectors):
+            if fields is not None:
+                fields.q_n.x.array[::4] = 1.0
+
+    def _number(self, mesh: Any, space: Any) -> None:
+        net, comm = self.net, self.comm
+        blocks = space.dofmap.index_map
+        self.owned = int(blocks.size_local)
+        count = self.owned + int(blocks.num_ghosts)
+        self.local_nodes = np.full(count, -1, dtype=np.int64)
+        self.local_nodes[_dolfinx.cell_dofs(space).ravel()] = _dolfinx.input_nodes(mesh).ravel()
+        self.local_cells = _dolfinx.input_cells(mesh)
+        owned_cells = int(mesh.topology.index_map(mesh.topology.dim).size_local)
+        self.owned_cells = self.local_cells[:owned_cells]
+        self.global_blocks = blocks.local_to_global(np.arange(count, dtype=np.int32))
+
+        self.node_block = np.full(len(net.points), -1, dtype=np.int64)
+        for part in comm.allgather(
+            (self.local_nodes[: self.owned], self.global_blocks[: self.owned])
+        ):
+            self.node_block[part[0]] = part[1]
+        if self.node_block.min() < 0:
+            raise RuntimeError("a node of the net has no place in the dolfinx mesh")
+        self.rows = expand(self.global_blocks)
+
+        # A crossing is assembled by the rank that owns its warp node.
+        first = self.global_blocks[0] if self.owned else 0
+        warp_block = self.node_block[net.crossings[:, 0]]
+        mine = (warp_block >= first) & (warp_block < first + self.owned)
+        self.local_crossings = np.flatnonzero(mine)
+
+    def _connect(self) -> ConnectorFields | None:
+        # Ranks take turns: each compiles the elements of a mesh of its own, into one cache.
+        fields = None
+        for rank in range(self.comm.size):
+            if rank == self.comm.rank:
+                fields = self._own_connectors()
+            self.comm.barrier()
+        return fields
+
+    def _own_connectors(self) -> ConnectorFields | None:
+        net, mine = self.net, self.local_crossings
+        self.connector_rows = np.zeros(0, dtype=PETSc.IntType)
+        if len(mine) == 0:
+            return None
+        count = len(mine)
+        # Vertex 2i is the warp end and 2i + 1 the weft end of connector i; the coordinate says so.
+        points = np.arange(2.0 * count)[:, None]
+        mesh = _dolfinx.interval_mesh(
+            MPI.COMM_SELF, points, np.arange(2 * count, dtype=np.int64).reshape(count, 2)
+        )
+        space = _dolfinx.lagrange(mesh, BLOCK)
+        vertex = np.zeros(2 * count, dtype=np.int64)
+        vertex[_dolfinx.cell_dofs(space).ravel()] = _dolfinx.input_nodes(mesh).ravel()
+        self.connector_order = _dolfinx.input_cells(mesh)
+        self.connector_nodes = net.crossings[mine].ravel()[vertex]
+        self.connector_blocks = self.node_block[self.connector_nodes].astype(PETSc.IntType)
+        self.connector_rows = expand(self.connector_blocks)
+
+        vectors = _dolfinx.constants_per_cell(mesh, 3)
+        directions = self._crossing_directions()
+        return ConnectorFields(
+            mesh=mesh,
+            space=space,
+            w=Function(space),
+            u_n=Function(_dolfinx.lagrange(mesh, 3)),
+            q_n=Function(_dolfinx.lagrange(mesh, 4)),
+            warp=self.crossing_field(vectors, directions["warp"]),
+            weft=self.crossing_field(vectors, directions["weft"]),
+            normal=self.crossing_field(vectors, directions["normal"]),
+        )
+
+    def nodal_directions(self) -> dict[str, Array]:
+        """Unit "tangent" of the tow and unit "normal" of the sheet at every node of the net."""
+        net = self.net
+        nodal = {}
+        for name, values in (("tangent", net.tangents), ("normal", net.normals)):
+            total = np.zeros((len(net.points), 3))
+            np.add.at(total, net.cells.ravel(), np.repeat(values, 2, axis=0))
+            nodal[name] = unit(total)
+        return nodal
+
+    def current(self) -> tuple[Array, Array]:
+        """Displacements (n_blocks, 3) [mm] and quaternions (n_blocks, 4) with the increment w."""
+        tows = self.tows
+        u = tows.u_n.x.array.reshape(-1, 3).copy()
+        q = tows.q_n.x.array.reshape(-1, 4).copy()
+        advance(u, q, tows.w.x.array.reshape(-1, BLOCK))
+        return u, q
+
+    def _crossing_directions(self) -> dict[str, Array]:
+        """Unit tangents of both tows and the unit normal at every crossing of the net."""
+        net = self.net
+        nodal = self.nodal_directions()
+        warp, weft = net.crossings.T
+        return {
+            "warp": nodal["tangent"][warp],
+            "weft": nodal["tangent"][weft],
+            "normal": unit(nodal["normal"][warp] + nodal["normal"][weft]),
+        }
+
+    def cell_field(self, space: Any, values: Array) -> Function:
+        """A field from values per cell of the net, shape (n_cells, size)."""
+        field = Function(space)
+        dofs = _dolfinx.cell_dofs(space)[:, 0]
+        field.x.array.reshape(-1, values.shape[1])[dofs] = values[self.local_cells]
+        return field
+
+    def crossing_field(self, space: Any, values: Array) -> Function:
+        """A connector field from values per crossing of the net, shape (n_crossings, size)."""
+        field = Function(space)
+        dofs = _dolfinx.cell_dofs(space)[:, 0]
+        own = values[self.local_crossings][self.connector_order]
+        field.x.array.reshape(len(dofs), -1)[dofs] = own.reshape(len(dofs), -1)
+        return field
+
+    def crossing_values(self, field: Any) -> Array:
+        """Values of a connector field at this rank's crossings, in the order of local_crossings."""
+        dofs = _dolfinx.cell_dofs(field.function_space)[:, 0]
+        values = field.x.array.reshape(len(dofs), -1)[dofs]
+        ordered = np.zeros_like(values)
+        ordered[self.connector_order] = values
+        return ordered
+
+    def matrix(self, *, crossings: bool = True) -> PETSc.Mat:
+        """An empty matrix with exactly the entries that the tows and the crossings need.
+
+        Release builds of PETSc drop entries outside the pattern without a word when dolfinx
+        inserts them; ``crossings=False`` leaves the coupling out, for the test that they matter.
+        """
+        net = self.net
+        pairs = [self.node_block[net.cells]]
+        if crossings:
+            pairs.append(self.node_block[net.crossings])
+        i, j = np.vstack(pairs).T
+        n = len(net.points)
+        ones = np.ones(len(i), dtype=np.int8)
+        graph = sparse.coo_matrix((ones, (i, j)), shape=(n, n)).tocsr()
+        graph = (graph + graph.T + sparse.identity(n, dtype=np.int8, format="csr")).tocsr()
+        first = int(self.global_blocks[0]) if self.owned else 0
+        first = self.comm.exscan(self.owned) or 0
+        own = graph[first : first + self.owned]
+        inside = own[:, first : first + self.owned]
+        diagonal = np.repeat(np.diff(inside.indptr) * BLOCK, BLOCK)
+        total = np.repeat(np.diff(own.indptr) * BLOCK, BLOCK)
+        A = PETSc.Mat().create(self.comm)
+        A.setSizes(((self.owned * BLOCK, n * BLOCK),) * 2)
+        A.setBlockSize(BLOCK)
+        A.setType(PETSc.Mat.Type.AIJ)
+        A.setPreallocationNNZ(
+            (diagonal.astype(PETSc.IntType), (total - diagonal).astype(PETSc.IntType))
+        )
+        A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
+        A.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        return A
+
+    def vector(self) -> PETSc.Vec:
+        """A zero vector of the unknowns."""
+        x = PETSc.Vec().create(self.comm)
+        x.setSizes((self.owned * BLOCK, len(self.net.points) * BLOCK))
+        x.setBlockSize(BLOCK)
+        x.setType(PETSc.Vec.Type.STANDARD)
+        x.set(0.0)
+        return x
+
+    def maps(self) -> tuple[PETSc.LGMap, PETSc.LGMap]:
+        """Local-to-global maps of the tows' blocks and of the connectors' blocks."""
+        blocks = np.asarray(self.global_blocks, dtype=PETSc.IntType)
+        connectors = getattr(self, "connector_blocks", np.zeros(0, dtype=PETSc.IntType))
+        return (
+            PETSc.LGMap().create(blocks, bsize=BLOCK, comm=self.comm),
+            PETSc.LGMap().create(connectors, bsize=BLOCK, comm=self.comm),
+        )
+
+    def gather_nodes(self, local: Array) -> Array:
+        """Rows per owned block of every rank, in the order of the net's nodes, on every rank."""
+        size = local.shape[1]
+        parts = self.comm.allgather((self.local_nodes[: self.owned], local[: self.owned]))
+        whole = np.zeros((len(self.net.points), size))
+        for nodes, values in parts:
+            whole[nodes] = values
+        return whole
+
+    def gather_cells(self, local: Array) -> Array:
+        """Rows per owned cell of every rank, in the order of the net's cells, on every rank."""
+        whole = np.zeros((len(self.net.cells), local.shape[1]))
+        count = len(self.owned_cells)
+        for cells, values in self.comm.allgather((self.owned_cells, local[:count])):
+            whole[cells] = values
+        return whole
+
+    def gather_crossings(self, local: Array) -> Array:
+        """Rows per crossing of every rank, in the order of the net's crossings, on every rank."""
+        whole = np.zeros((len(self.net.crossings), local.shape[1]))
+        for crossings, values in self.comm.allgather((self.local_crossings, local)):
+            whole[crossings] = values
+        return whole
+
+    def everywhere(self, update: Callable[[Any], None]) -> None:
+        """Apply an update to the fields of the tows and to those of the connectors."""
+        update(self.tows)
+        if self.connectors is not None:
+            update(self.connectors)
+
+
+def expand(blocks: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Scalar row numbers of global blocks, in the order of the local array."""
+    rows = np.asarray(blocks)[:, None] * BLOCK + np.arange(BLOCK)
+    return rows.ravel().astype(PETSc.IntType)
+
+
+def unit(vectors: Array) -> Array:
+    """Rows scaled to length one."""
+    return vectors / np.linalg.norm(vectors, axis=1)[:, None]

@@ -1,0 +1,256 @@
+"""Time stepping: generalised-α on the Lie group, with steps that are cut and grown.
+
+Generalised-α after Brüls, Cardona & Arnold (Mech. Mach. Theory 48, 2012), in Arnold & Brüls' form
+with the auxiliary acceleration a. With w the increment of the step, h its length,
+
+    w = h v_n + (1/2 − β) h² a_n + β h² a,     v = v_n + (1 − γ) h a_n + γ h a,
+    (1 − α_m) a + α_m a_n = (1 − α_f) v̇ + α_f v̇_n,
+
+equilibrium holds at the end of the step, and v and v̇ are linear in w. Displacements add;
+rotations compose by the Cayley map, v holds material angular velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import SolveError
+from .newton import Newton, Outcome
+from .update import advance
+
+if TYPE_CHECKING:
+    from .model import Model
+
+__all__ = ["GeneralisedAlpha", "State", "Step", "StepControl", "Stepper"]
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class GeneralisedAlpha:
+    """Parameters of the method for a spectral radius at infinite frequency.
+
+    Attributes:
+        radius: 1 keeps energy, 0 annihilates what the step cannot resolve.
+    """
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.radius <= 1.0:
+            raise ValueError(f"spectral radius {self.radius}: allowed is 0 to 1")
+
+    @property
+    def alpha_m(self) -> float:
+        """α_m = (2ρ − 1)/(ρ + 1)."""
+        return (2.0 * self.radius - 1.0) / (self.radius + 1.0)
+
+    @property
+    def alpha_f(self) -> float:
+        """α_f = ρ/(ρ + 1)."""
+        return self.radius / (self.radius + 1.0)
+
+    @property
+    def gamma(self) -> float:
+        """γ = 1/2 + α_f − α_m: second order."""
+        return 0.5 + self.alpha_f - self.alpha_m
+
+    @property
+    def beta(self) -> float:
+        """β = (γ + 1/2)²/4."""
+        return 0.25 * (self.gamma + 0.5) ** 2
+
+    def rates(self, h: float) -> tuple[float, float]:
+        """c_0 and c_1 of a = c_0 w + a*, v = c_1 w + v*."""
+        c_0 = (1.0 - self.alpha_m) / ((1.0 - self.alpha_f) * self.beta * h**2)
+        return c_0, self.gamma / (self.beta * h)
+
+
+@dataclass(slots=True)
+class State:
+    """What a step starts from, per local block (ghosts included).
+
+    Attributes:
+        time: [s].
+        v: velocity [mm/s] and material angular velocity [rad/s], (n, 6).
+        vdot: their rates, (n, 6).
+        a: the method's auxiliary accelerations, (n, 6).
+        previous: the last accepted increment, for the predictor, (n, 6).
+        previous_step: its step length [s]; 0 before the first.
+        next_step: what the step control proposes [s]; 0 before the first.
+    """
+
+    time: float
+    v: Array
+    vdot: Array
+    a: Array
+    previous: Array
+    previous_step: float = 0.0
+    next_step: float = 0.0
+
+
+@dataclass(slots=True)
+class StepControl:
+    """How steps are cut and grown.
+
+    Attributes:
+        first: first step [s].
+        smallest: giving up below this step [s].
+        largest: never above this step [s].
+        aim: iterations a step should take: above it steps shrink, below it they grow.
+        grow, cut: factors on the step after an easy step and after a failed one.
+    """
+
+    first: float
+    smallest: float
+    largest: float
+    aim: int = 7
+    grow: float = 1.5
+    cut: float = 0.35
+
+    def after(self, length: float, planned: float, iterations: int) -> float:
+        """The next step after one of this length took so many iterations."""
+        if iterations <= self.aim:
+            return max(planned, length * self.grow)
+        if iterations > 2 * self.aim:
+            return 0.7 * length
+        return planned
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """An accepted step.
+
+    Attributes:
+        number: counts from 1.
+        time: its end [s].
+        length: Δt [s].
+        iterations: of Newton.
+        failures: attempts with longer steps that failed before it.
+    """
+
+    number: int
+    time: float
+    length: float
+    iterations: int
+    failures: int
+
+
+class Stepper:
+    """Drives Newton through time.
+
+    Args:
+        model: what moves; see solving.model.
+        newton: its solver.
+        control: step lengths.
+        observe: called when a step has converged, the increment w still in the fields.
+        keep: called after that, when the step has become the accepted state.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        newton: Newton,
+        control: StepControl,
+        *,
+        observe: Callable[[Step], None] = lambda step: None,
+        keep: Callable[[Step], None] = lambda step: None,
+    ) -> None:
+        self.model, self.newton, self.control = model, newton, control
+        self.observe, self.keep = observe, keep
+        self.alpha = model.alpha
+        self.net = model.disc
+        self.state = State(0.0, *(np.zeros((len(self.net.local_nodes), 6)) for _ in range(4)))
+        self.number = 0
+        self.failures = 0
+        self.wasted_iterations = 0
+
+    def run(self, end: float) -> None:
+        """Go to the time ``end`` [s].
+
+        Raises:
+            SolveError: the next step would have to be smaller than allowed.
+        """
+        control = self.control
+        h = self.state.next_step or control.first
+        failures = 0
+        while self.state.time < end * (1.0 - 1e-12):
+            left = end - self.state.time
+            length = min(h, control.largest)
+            if left < 2.0 * length:
+                # Two equal steps rather than a long one and a tiny one at the end.
+                length = left if left <= 1.0001 * length else left / 2.0
+            outcome = self.try_step(length)
+            if outcome.converged:
+                self.number += 1
+                now = self.state.time + length
+                step = Step(self.number, now, length, outcome.iterations, failures)
+                h = control.after(length, h, outcome.iterations)
+                self.observe(step)
+                self.advance(length)
+                self.state.next_step = h
+                self.keep(step)
+                failures = 0
+                continue
+            failures += 1
+            self.failures += 1
+            self.wasted_iterations += outcome.iterations
+            h = length * control.cut
+            if h < control.smallest:
+                raise SolveError(
+                    f"stopped at t = {self.state.time:.6g} s after {self.number} accepted steps: "
+                    f"{outcome.reason} (step {length:.3g} s, residual {outcome.residual:.3g} N; "
+                    f"the smallest step allowed is {control.smallest:.3g} s)"
+                )
+
+    def try_step(self, h: float) -> Outcome:
+        """Attempt a step of length h from the accepted state."""
+        net, state, model = self.net, self.state, self.model
+        model.set_time(state.time, state.time + h)
+        if self.alpha is not None:
+            model.set_rates(*self.alpha.rates(h))
+            v_star, a_star = self._known_rates(h)
+            net.tows.rate_star.x.array[:] = v_star.ravel()
+            net.tows.acceleration_star.x.array[:] = a_star.ravel()
+        # The guess goes on as the last step went.
+        ratio = h / state.previous_step if state.previous_step else 0.0
+        self.newton.x.array[:] = ratio * state.previous[: net.owned].ravel()
+        return self.newton.solve(model.targets(state.time, state.time + h))
+
+    def advance(self, h: float) -> None:
+        """Make the increment in the fields the new accepted state."""
+        state, w = self.state, self.net.tows.w.x.array.reshape(-1, 6)
+        self.model.remember()
+        if self.alpha is not None:
+            m = self.alpha
+            c_0, c_1 = m.rates(h)
+            v_star, a_star = self._known_rates(h)
+            a = (w - self._drift(h)) / (m.beta * h**2)
+            state.v, state.vdot, state.a = c_1 * w + v_star, c_0 * w + a_star, a
+        state.previous = w.copy()
+        state.previous_step = h
+        state.time += h
+        self.net.everywhere(_advance_fields)
+
+    def _drift(self, h: float) -> Array:
+        return h * self.state.v + (0.5 - self.alpha.beta) * h**2 * self.state.a
+
+    def _known_rates(self, h: float) -> tuple[Array, Array]:
+        """v* and a*: the parts of velocity and acceleration known before the step."""
+        m, s = self.alpha, self.state
+        c_0, c_1 = m.rates(h)
+        drift = self._drift(h)
+        v_star = s.v + (1.0 - m.gamma) * h * s.a - c_1 * drift
+        a_star = (m.alpha_m * s.a - m.alpha_f * s.vdot) / (1.0 - m.alpha_f) - c_0 * drift
+        return v_star, a_star
+
+
+def _advance_fields(fields: Any) -> None:
+    w = fields.w.x.array.reshape(-1, 6)
+    advance(fields.u_n.x.array.reshape(-1, 3), fields.q_n.x.array.reshape(-1, 4), w)
+    w[:] = 0.0

@@ -1,0 +1,175 @@
+"""The residual and the tangent of a sum of terms, assembled for PETSc."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from time import perf_counter
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx.fem import Function
+
+from .. import _dolfinx
+from ..mechanics.beam import SectionLaw, linear_section, linearised_forces
+from ..mechanics.terms import Term
+from .discretisation import BLOCK, Discretisation
+
+__all__ = ["System"]
+
+Array = npt.NDArray[np.float64]
+
+
+class System:
+    """All terms of a model, compiled, and how to assemble them.
+
+    Args:
+        net: the discretised net.
+        terms: the model; their forms are compiled here (collective, slow on a first run).
+        law: the section law of the beam term, for the forces that its tangent needs.
+
+    Attributes:
+        nodal_loads: dead forces and material moments on each local block, (n_blocks, 6)
+            [N, N mm]; ghosts are ignored.
+    """
+
+    def __init__(
+        self, net: Discretisation, terms: Sequence[Term], *, law: SectionLaw = linear_section
+    ) -> None:
+        self.net = net
+        self.terms = list(terms)
+        comm = net.comm
+        here = {"tows": True, "crossovers": net.connectors is not None}
+        with_crossings = {"tows": True, "crossovers": len(net.net.crossings) > 0}
+        self._residuals: dict[str, list[Any]] = {"tows": [], "crossovers": []}
+        self._tangents: dict[str, list[Any]] = {"tows": [], "crossovers": []}
+        self._energies: dict[str, Any] = {}
+        self._term_residuals: dict[str, Any] = {}
+        for term in self.terms:
+            if not with_crossings[term.where]:
+                continue
+            own = here[term.where]
+            residual = _dolfinx.compile_form(term.residual, comm, here=own)
+            self._residuals[term.where].append(residual)
+            self._term_residuals[term.name] = residual
+            if term.tangent is not None:
+                self._tangents[term.where].append(
+                    _dolfinx.compile_form(term.tangent, comm, here=own)
+                )
+            if term.energy is not None:
+                self._energies[term.name] = _dolfinx.compile_form(term.energy, comm, here=own)
+        tows = net.tows
+        self._dw = Function(tows.space)
+        self._forces = _dolfinx.compile_form(
+            linearised_forces(tows, self._dw, net.forces_space, law), comm
+        )
+        self.nodal_loads = np.zeros((len(net.local_nodes), BLOCK))
+        self.assemble_seconds = 0.0
+        self._local = np.zeros(len(net.rows))
+        self._lg_tows, self._lg_crossovers = net.maps()
+        self._x = net.vector()
+        connectors = PETSc.IS().createGeneral(net.connector_rows, comm=MPI.COMM_SELF)
+        count = len(net.connector_rows)
+        self._connector_values = PETSc.Vec().createSeq(count, comm=MPI.COMM_SELF)
+        self._to_connectors = PETSc.Scatter().create(
+            self._x, connectors, self._connector_values, None
+        )
+
+    def set_increment(self, x: PETSc.Vec, *, linearise_from: str | None = None) -> None:
+        """Copy x into w on all meshes; ``linearise_from`` updates the tangent's section forces.
+
+        Args:
+            x: the step's increment (Δu, θ) of all nodes.
+            linearise_from: "zero" linearises about the start of the step, "last" about the w of
+                the last call (one Newton step ago), None leaves the forces alone.
+        """
+        net = self.net
+        w = net.tows.w
+        own = net.owned * BLOCK
+        if linearise_from == "zero":
+            w.x.array[:] = 0.0
+        if linearise_from is not None:
+            self._dw.x.array[:own] = x.array_r - w.x.array[:own]
+            self._dw.x.scatter_forward()
+            s = net.tows.section_forces.x
+            s.array[:] = 0.0
+            _dolfinx.add_vector(s.array, self._forces)
+        w.x.array[:own] = x.array_r
+        w.x.scatter_forward()
+        self._to_connectors.scatter(x, self._connector_values)
+        if net.connectors is not None:
+            net.connectors.w.x.array[:] = self._connector_values.array_r
+
+    def residual(self, F: PETSc.Vec) -> None:
+        """Assemble the residual at the increment set last."""
+        start = perf_counter()
+        net = self.net
+        own = net.owned * BLOCK
+        local = self._local
+        local[:] = 0.0
+        for form in self._residuals["tows"]:
+            _dolfinx.add_vector(local, form)
+        local[:own] -= self.nodal_loads[: net.owned].ravel()
+        F.array[:] = local[:own]
+        F.setValues(net.rows[own:], local[own:], addv=PETSc.InsertMode.ADD_VALUES)
+        if net.connectors is not None:
+            values = np.zeros(len(net.connector_rows))
+            for form in self._residuals["crossovers"]:
+                _dolfinx.add_vector(values, form)
+            F.setValues(net.connector_rows, values, addv=PETSc.InsertMode.ADD_VALUES)
+        F.assemble()
+        self.assemble_seconds += perf_counter() - start
+
+    def tangent(self, A: PETSc.Mat) -> None:
+        """Assemble the tangent at the increment and section forces set last."""
+        start = perf_counter()
+        A.zeroEntries()
+        A.setLGMap(self._lg_tows, self._lg_tows)
+        for form in self._tangents["tows"]:
+            _dolfinx.add_matrix(A, form)
+        # The connectors' forms are assembled by the same kernels into the same matrix: only the
+        # meaning of a local number changes.
+        A.assemble(PETSc.Mat.AssemblyType.FLUSH)
+        A.setLGMap(self._lg_crossovers, self._lg_crossovers)
+        if self.net.connectors is not None:
+            for form in self._tangents["crossovers"]:
+                _dolfinx.add_matrix(A, form)
+        A.assemble()
+        self.assemble_seconds += perf_counter() - start
+
+    def energies(self) -> dict[str, float]:
+        """Stored energy of each term that has one [N mm], summed over the ranks."""
+        names = list(self._energies)
+        own = np.array(
+            [
+                0.0 if form is None else _dolfinx.cell_scalar(form)
+                for form in self._energies.values()
+            ]
+        )
+        total = np.zeros_like(own)
+        self.net.comm.Allreduce(own, total)
+        return dict(zip(names, total.tolist(), strict=True))
+
+    def term_forces(self, name: str) -> Array:
+        """Nodal forces of one tow term (the negative is what it exerts), (n_owned, 6) [N, N mm]."""
+        net = self.net
+        local = np.zeros(len(net.rows))
+        _dolfinx.add_vector(local, self._term_residuals[name])
+        F = net.vector()
+        own = net.owned * BLOCK
+        F.array[:] = local[:own]
+        F.setValues(net.rows[own:], local[own:], addv=PETSc.InsertMode.ADD_VALUES)
+        F.assemble()
+        return F.array_r.copy().reshape(-1, BLOCK)
+
+    def section_forces(self) -> Array:
+        """(N, M) of this rank's cells at the increment set last, (n_local_cells, 6) [N, N mm]."""
+        tows = self.net.tows
+        self._dw.x.array[:] = 0.0
+        values = np.zeros_like(tows.section_forces.x.array)
+        _dolfinx.add_vector(values, self._forces)
+        dofs = _dolfinx.cell_dofs(tows.section_forces.function_space)[:, 0]
+        return values.reshape(-1, 6)[dofs]

@@ -1,0 +1,39 @@
+"""The same rotations as mechanics.rotations, on arrays: what happens after a step is accepted."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["advance", "cayley", "compose", "rotate"]
+
+Array = npt.NDArray[np.float64]
+
+
+def cayley(theta: Array) -> Array:
+    """Unit quaternions (1, θ/2) / sqrt(1 + |θ|²/4), shape (n, 4), of vectors (n, 3) [rad]."""
+    q = np.column_stack([np.ones(len(theta)), theta / 2.0])
+    return q / np.linalg.norm(q, axis=1)[:, None]
+
+
+def compose(p: Array, q: Array) -> Array:
+    """Rotations q followed by p, all of shape (n, 4)."""
+    scalar = p[:, 0] * q[:, 0] - np.einsum("ij,ij->i", p[:, 1:], q[:, 1:])
+    vector = p[:, :1] * q[:, 1:] + q[:, :1] * p[:, 1:] + np.cross(p[:, 1:], q[:, 1:])
+    return np.column_stack([scalar, vector])
+
+
+def rotate(q: Array, v: Array) -> Array:
+    """Vectors (n, 3) turned by unit quaternions (n, 4)."""
+    t = 2.0 * np.cross(q[:, 1:], v)
+    return v + q[:, :1] * t + np.cross(q[:, 1:], t)
+
+
+def advance(u: Array, q: Array, w: Array) -> None:
+    """Add the increment w (n, 6) to displacements u (n, 3) and rotations q (n, 4), in place.
+
+    The quaternions are normalised again: products of unit quaternions drift by round-off.
+    """
+    u += w[:, :3]
+    q[:] = compose(q, cayley(w[:, 3:]))
+    q /= np.linalg.norm(q, axis=1)[:, None]
