@@ -112,7 +112,7 @@ class System:
         local[:] = 0.0
         for form in self._residuals["tows"]:
             _dolfinx.add_vector(local, form)
-        local[:own] -= self.nodal_loads[: net.owned].ravel()
+        local[:own] -= self._load_work()[0].ravel()
         F.array[:] = local[:own]
         F.setValues(net.rows[own:], local[own:], addv=PETSc.InsertMode.ADD_VALUES)
         if net.connectors is not None:
@@ -130,6 +130,12 @@ class System:
         A.setLGMap(self._lg_tows, self._lg_tows)
         for form in self._tangents["tows"]:
             _dolfinx.add_matrix(A, form)
+        turning = np.flatnonzero(self.nodal_loads[: self.net.owned, 3:].any(axis=1))
+        if len(turning):
+            rates = self._load_work()[1]
+            for block in turning:
+                rows = self.net.rows[block * BLOCK + 3 : (block + 1) * BLOCK]
+                A.setValues(rows, rows, -rates[block], addv=PETSc.InsertMode.ADD_VALUES)
         # The connectors' forms are assembled by the same kernels into the same matrix: only the
         # meaning of a local number changes.
         A.assemble(PETSc.Mat.AssemblyType.FLUSH)
@@ -139,6 +145,26 @@ class System:
                 _dolfinx.add_matrix(A, form)
         A.assemble()
         self.assemble_seconds += perf_counter() - start
+
+    def _load_work(self) -> tuple[Array, Array]:
+        """What the nodal loads do on v, and the derivative of their turning part in θ.
+
+        A moment m works on the virtual spin of mechanics.rotations.spin, not on the change of θ:
+        m · (v − θ×v/2)/s = v · (m + θ×m/2)/s with s = 1 + |θ|²/4.
+
+        Returns:
+            Forces on the owned blocks, (n_owned, 6), and d(moments)/dθ, (n_owned, 3, 3).
+        """
+        own = self.net.owned
+        work = self.nodal_loads[:own].copy()
+        m = self.nodal_loads[:own, 3:]
+        theta = self.net.tows.w.x.array.reshape(-1, BLOCK)[:own, 3:]
+        s = 1.0 + (theta * theta).sum(axis=1, keepdims=True) / 4.0
+        work[:, 3:] = (m + np.cross(theta, m) / 2.0) / s
+        # d(θ×m)/dθ: column i is e_i × m.
+        turned = np.cross(np.eye(3)[None, :, :], m[:, None, :]).transpose(0, 2, 1) / 2.0
+        rates = (turned - work[:, 3:, None] * theta[:, None, :] / 2.0) / s[:, :, None]
+        return work, rates
 
     def energies(self) -> dict[str, float]:
         """Stored energy of each term that has one [N mm], summed over the ranks."""

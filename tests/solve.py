@@ -1,0 +1,98 @@
+"""What the verification tests share: sections given by their stiffness, load steps, rotations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fabric_fenicsx.solving.model import Model
+from fabric_fenicsx.solving.stepping import StepControl, Stepper
+
+
+@dataclass(frozen=True)
+class GivenSection:
+    """A section by its numbers: (EA, κGA, κGA, GJ, E I_out, E I_in) and (ρA, ρI about d1, d2, d3)."""
+
+    values: tuple[float, ...]
+    masses: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0)
+
+    def stiffness(self):
+        """Diagonal of the section law."""
+        return np.array(self.values)
+
+    def mass(self):
+        """Mass per length and rotary inertia."""
+        return np.array(self.masses)
+
+
+class Statics:
+    """Load steps on a model without inertia: loads are set by ``load(fraction)``, time is it too.
+
+    Attributes:
+        outcomes: of every step.
+    """
+
+    def __init__(self, model: Model, *, force_tolerance: float, limit: int = 25) -> None:
+        self.model = model
+        newton = model.newton(force_tolerance=force_tolerance, limit=limit)
+        self.stepper = Stepper(model, newton, StepControl(1.0, 1e-6, 1.0))
+        self.outcomes = []
+
+    def run(self, steps: int, load: Callable[[float], None] = lambda part: None) -> None:
+        """Equal steps from fraction 0 to 1; every one must converge."""
+        for k in range(1, steps + 1):
+            load(k / steps)
+            self.step(1.0 / steps, keep=True)
+
+    def step(self, length: float, *, keep: bool) -> None:
+        """One step; ``keep`` makes it the accepted state, else the increment stays in the fields."""
+        outcome = self.stepper.try_step(length)
+        self.outcomes.append(outcome)
+        assert outcome.converged, f"step {len(self.outcomes)}: {outcome}"
+        if keep:
+            self.stepper.advance(length)
+
+    @property
+    def displacements(self):
+        """Accepted displacements [mm] in the order of the net's nodes, (n_nodes, 3)."""
+        disc = self.model.disc
+        return disc.gather_nodes(disc.tows.u_n.x.array.reshape(-1, 3)[: disc.owned])
+
+    @property
+    def quaternions(self):
+        """Accepted rotations in the order of the net's nodes, (n_nodes, 4)."""
+        disc = self.model.disc
+        return disc.gather_nodes(disc.tows.q_n.x.array.reshape(-1, 4)[: disc.owned])
+
+
+def set_loads(model: Model, node: int, load) -> None:
+    """Force and material moment on a node of the net."""
+    disc = model.disc
+    model.system.nodal_loads[disc.local_nodes == node] = load
+
+
+def random_rotation(rng: np.random.Generator):
+    """A rotation matrix and its quaternion, uniformly distributed."""
+    q = rng.normal(size=4)
+    q /= np.linalg.norm(q)
+    return matrix(q), q
+
+
+def matrix(q):
+    """The rotation matrix of a unit quaternion, from its textbook formula."""
+    w, x, y, z = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def orders(errors, factor: float = 2.0):
+    """Observed orders of convergence of errors on meshes (or steps) finer by a factor each."""
+    errors = np.asarray(errors)
+    return np.log(errors[:-1] / errors[1:]) / np.log(factor)
