@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import numpy.typing as npt
 
 from ..errors import InputError
 from ..output.paraview import TimeSeries
+from ..output.snapshot import Snapshot
 from .model import Model
 from .stepping import Step, Stepper
 
@@ -75,7 +77,7 @@ class Record:
                 rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
             self.rows = [row for row in rows if row["time_s"] <= resume_at * (1.0 + 1e-12)]
 
-    def observe(self, step: Step, extra: dict[str, float]) -> None:
+    def observe(self, step: Step, measure: Callable[[Snapshot], dict[str, float]]) -> Snapshot:
         """Write what is seen of a converged step: energies, tool forces, the ParaView files."""
         model = self.model
         snapshot = model.snapshot(step.time)
@@ -90,7 +92,7 @@ class Record:
         row |= {f"energy_{_key(k)}_N_mm": v for k, v in energies.items()}
         for name, force in model.tool_forces().items():
             row[f"{_key(name)}_force_z_N"] = float(force[2])
-        row |= extra
+        row |= measure(snapshot)
         self.rows.append(row)
         if self._root:
             self._series.add(snapshot)
@@ -98,6 +100,7 @@ class Record:
                 writer = csv.DictWriter(file, list(row))
                 writer.writeheader()
                 writer.writerows(self.rows)
+        return snapshot
 
     def keep(self, step: Step, stepper: Stepper) -> None:
         """Write the accepted state."""

@@ -10,6 +10,7 @@ from typing import Any
 
 from .. import _dolfinx
 from ..errors import InputError, SolveError
+from ..output.snapshot import Snapshot
 from .model import Model
 from .record import Record, load_state
 from .stepping import Step, StepControl, Stepper
@@ -27,12 +28,14 @@ class Run:
         completed: whether it reached its end.
         stop: why it stopped, if it did not.
         rows: what was recorded at each accepted step.
+        last: the last accepted step, if there was one.
         summary: the fixed part of result.json.
     """
 
     completed: bool
     stop: str | None
     rows: list[dict[str, float]]
+    last: Snapshot | None
     summary: dict[str, Any]
 
 
@@ -45,7 +48,7 @@ def simulate(
     control: StepControl,
     force_tolerance: float,
     iteration_limit: int = 20,
-    measure: Callable[[], dict[str, float]] = dict,
+    measure: Callable[[Snapshot], dict[str, float]] = lambda snapshot: {},
     progress: Callable[[float, int, int], None] = lambda time, step, iterations: None,
     resume: bool = False,
     started: float | None = None,
@@ -60,7 +63,7 @@ def simulate(
         control: step lengths.
         force_tolerance: residual norm at which a step is in balance [N, N mm].
         iteration_limit: Newton iterations after which a step has failed.
-        measure: further columns for each step's row, evaluated with its increment in the fields.
+        measure: further columns for each step's row, from its snapshot.
         progress: told the time reached, the step and its iterations.
         resume: go on from the last step file in the folder.
         started: perf_counter() at the start of the command, for the total seconds.
@@ -79,10 +82,14 @@ def simulate(
         if not files:
             raise InputError(f"{folder}: no step to resume from; run without resuming first")
         load_state(files[-1], stepper)
+        if stepper.state.time >= end * (1.0 - 1e-12):
+            raise InputError(f"{folder}: the run is complete, there is nothing to resume")
     record = Record(folder, model, resume_at=stepper.state.time if resume else None)
 
+    last: list[Snapshot] = []
+
     def observe(step: Step) -> None:
-        record.observe(step, measure())
+        last[:] = [record.observe(step, measure)]
         progress(step.time, step.number, step.iterations)
 
     stepper.observe = observe
@@ -111,4 +118,4 @@ def simulate(
         "dofs": int(model.net.points.shape[0] * 6),
         "seconds": {key: round(value, 3) for key, value in seconds.items()},
     }
-    return Run(stop is None, stop, record.rows, summary)
+    return Run(stop is None, stop, record.rows, last[0] if last else None, summary)

@@ -1,0 +1,1 @@
+"""The experiments: draping over a hemisphere, the picture frame, the cantilever."""

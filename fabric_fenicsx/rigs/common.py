@@ -1,0 +1,136 @@
+"""What the rigs share: from the keys of a case to the objects of the model."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from ..errors import InputError
+from ..fabric.gmsh_io import read_msh, write_msh
+from ..fabric.net import Net
+from ..fabric.section import RectangularSection
+from ..fabric.sheet import Sheet
+from ..solving.model import CrossoverLaw
+from ..solving.simulation import Run
+from ..solving.stepping import StepControl
+from .cases import Common, CrossoverKeys, SolverKeys, TowKeys
+
+__all__ = [
+    "Session",
+    "control",
+    "crossover_law",
+    "extend",
+    "section",
+    "tow_net",
+    "write_table",
+]
+
+
+@dataclass(slots=True)
+class Session:
+    """Where and how a case is run.
+
+    Attributes:
+        folder: for the results; exists.
+        comm: communicator.
+        base: folder that relative paths in the case count from.
+        started: perf_counter() when the command began.
+        progress: told (fraction done, accepted steps, iterations of the last one).
+        resume: go on from the last step in the folder.
+        pictures: draw them.
+    """
+
+    folder: Path
+    comm: MPI.Comm
+    base: Path
+    started: float
+    progress: Callable[[float, int, int], None] = field(default=lambda *_: None)
+    resume: bool = False
+    pictures: bool = True
+
+    @property
+    def root(self) -> bool:
+        """Whether this rank writes."""
+        return bool(self.comm.rank == 0)
+
+
+def section(keys: TowKeys) -> RectangularSection:
+    """Section of the tows; kg becomes tonne."""
+    return RectangularSection(
+        width=keys.width_mm,
+        height=keys.height_mm,
+        density=keys.density_kg_mm3 * 1e-3,
+        C1=keys.C1_MPa,
+        shear_correction=keys.shear_correction,
+    )
+
+
+def crossover_law(keys: CrossoverKeys, warp_spacing: float, weft_spacing: float) -> CrossoverLaw:
+    """Laws per crossing from laws per area: M = m · warp spacing · weft spacing."""
+    area = warp_spacing * weft_spacing
+    return CrossoverLaw(
+        translation=keys.translation_N_mm,
+        k1=keys.k1_N_mm * area,
+        k3=keys.k3_N_mm * area,
+        dashpot=keys.dashpot_N_s_mm * area,
+        alignment=keys.alignment_N_mm,
+    )
+
+
+def control(keys: SolverKeys) -> StepControl:
+    """Step control of a case."""
+    return StepControl(
+        first=keys.first_step_s, smallest=keys.smallest_step_s, largest=keys.largest_step_s
+    )
+
+
+def tow_net(case: Common, sheet: Sheet, session: Session) -> Net:
+    """The net of a case: from its .msh, or from the sheet by gmsh. Collective.
+
+    Raises:
+        InputError: the mesh cannot be read (on every rank).
+    """
+    comm = session.comm
+    net: Net | None = None
+    problem: str | None = None
+    if session.root:
+        try:
+            if case.mesh is not None:
+                net = read_msh(session.base / case.mesh)
+            else:
+                with tempfile.TemporaryDirectory() as folder:
+                    path = Path(folder) / "tows.msh"
+                    write_msh(sheet, path)
+                    net = read_msh(path)
+        except InputError as error:
+            problem = str(error)
+    problem = comm.bcast(problem)
+    if problem is not None:
+        raise InputError(problem)
+    whole: Net = comm.bcast(net)
+    return whole
+
+
+def write_table(session: Session, name: str, columns: dict[str, npt.NDArray[Any]]) -> None:
+    """Write a CSV into the results, on rank 0."""
+    if session.root:
+        pd.DataFrame(columns).to_csv(session.folder / name, index=False, float_format="%.9g")
+
+
+def extend(run: Run, quantities: dict[str, Any]) -> dict[str, Any]:
+    """result.json of a run with its quantities."""
+    return {**run.summary, "quantities": quantities}
+
+
+def lowest(net: Net, u: npt.NDArray[np.float64]) -> float:
+    """Lowest point of the deformed net [mm]."""
+    return float((net.points + u)[:, 2].min())

@@ -1,0 +1,209 @@
+"""Draping over a hemisphere (Wei & Zhang, Figures 12 to 17).
+
+The die lies below the sheet and is fixed; the blank holder above it closes to a prescribed gap;
+the punch presses the sheet through the hole. Tools are frictionless: the paper oiled them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+from ..fabric.net import Net
+from ..fabric.sheet import Sheet, centred_sheet
+from ..mechanics.tools import HoledPlate, Sphere, Tool
+from ..output.pictures import RevolvedSurface, draw_net
+from ..output.snapshot import Snapshot
+from ..solving.model import ContactLaw, Model, Support
+from ..solving.simulation import Run, simulate
+from ..solving.stepping import GeneralisedAlpha
+from .cases import DrapeCase
+from .common import Session, control, crossover_law, extend, lowest, section, tow_net, write_table
+
+__all__ = ["angles_at", "build", "flat_sheet", "run", "tools"]
+
+
+def flat_sheet(case: DrapeCase) -> Sheet:
+    """The sheet of the case, or its quarter."""
+    keys = case.sheet
+    return centred_sheet(
+        keys.width_mm,
+        keys.length_mm,
+        keys.warp_spacing_mm,
+        keys.weft_spacing_mm,
+        subdivisions=keys.subdivisions,
+        quarter=case.symmetry == "quarter",
+    )
+
+
+def tools(case: DrapeCase) -> list[Tool]:
+    """Punch, die and holder with their motions."""
+    speed = case.punch_travel_mm / case.duration_s
+    x, y = case.punch_offset_x_mm, case.punch_offset_y_mm
+    closing = case.holder_gap_mm - case.holder_gap_start_mm
+
+    def punch(time: float) -> tuple[float, float, float]:
+        return x, y, case.punch_radius_mm - speed * time
+
+    def holder(time: float) -> tuple[float, float, float]:
+        return x, y, case.holder_gap_start_mm + closing * min(time / case.holder_closing_s, 1.0)
+
+    hole, edge = case.hole_radius_mm, case.edge_radius_mm
+    return [
+        Sphere("punch", punch, case.punch_radius_mm),
+        HoledPlate("die", lambda time: (x, y, 0.0), hole, edge, 1.0),
+        HoledPlate("holder", holder, hole, edge, -1.0),
+    ]
+
+
+def symmetry_planes(net: Net) -> list[Support]:
+    """Nodes on x = 0 stay in that plane and turn about its normal only; likewise y = 0."""
+    planes = []
+    for axis, held in ((0, (0, 4, 5)), (1, (1, 3, 5))):
+        nodes = np.flatnonzero(np.abs(net.points[:, axis]) < 1e-9 * np.ptp(net.points))
+        planes.append(Support(nodes, held))
+    return planes
+
+
+def build(case: DrapeCase, session: Session) -> Model:
+    """The model of a drape case. Collective."""
+    net = tow_net(case, flat_sheet(case), session)
+    keys = case.sheet
+    return Model(
+        net,
+        section(case.tow),
+        crossovers=crossover_law(case.crossover, keys.warp_spacing_mm, keys.weft_spacing_mm),
+        gravity=(0.0, 0.0, -case.gravity_mm_s2),
+        inertia=GeneralisedAlpha(case.solver.spectral_radius),
+        mass_scale=case.solver.mass_scale,
+        viscosity=case.tow.relaxation_time_s,
+        tools=tools(case),
+        contact_law=ContactLaw(case.contact.stiffness_N_mm2, case.contact.layer_mm),
+        supports=symmetry_planes(net) if case.symmetry == "quarter" else (),
+        comm=session.comm,
+    )
+
+
+def angles_at(
+    net: Net, shear_angle: npt.NDArray[np.float64], places: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Angle between the tows [degrees] at places on the flat sheet.
+
+    Linear between the crossings, the nearest crossing's outside of them. The acute angle, as a
+    protractor on a photograph gives it.
+
+    Args:
+        net: the net.
+        shear_angle: γ of its crossings [rad], (n_crossings,).
+        places: x and y on the undeformed sheet [mm], (n, 2).
+    """
+    flat = net.points[net.crossings].mean(axis=1)[:, :2]
+    angle = 90.0 - np.degrees(np.abs(shear_angle))
+    inside = LinearNDInterpolator(flat, angle)(places)
+    outside = NearestNDInterpolator(flat, angle)(places)
+    return np.where(np.isnan(inside), outside, inside)
+
+
+def run(case: DrapeCase, session: Session) -> dict[str, Any]:
+    """Run a drape case and write its results. Collective.
+
+    Returns:
+        The content of result.json.
+    """
+    model = build(case, session)
+
+    def measure(snapshot: Snapshot) -> dict[str, float]:
+        return {"largest_shear_deg": float(np.degrees(np.abs(snapshot.shear_angle).max()))}
+
+    outcome = simulate(
+        model,
+        session.folder,
+        test="drape",
+        end=case.duration_s,
+        control=control(case.solver),
+        force_tolerance=case.solver.force_tolerance_N,
+        iteration_limit=case.solver.iteration_limit,
+        measure=measure,
+        progress=lambda time, step, its: session.progress(time / case.duration_s, step, its),
+        resume=session.resume,
+        started=session.started,
+    )
+    return report(case, session, model, outcome)
+
+
+def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dict[str, Any]:
+    """Tables, pictures and quantities of the last accepted step."""
+    quantities: dict[str, Any] = {}
+    snapshot, net = outcome.last, model.net
+    if snapshot is not None:
+        _write_crossings(session, net, snapshot)
+        row = outcome.rows[-1]
+        quantities = {
+            "punch_depth_mm": case.punch_travel_mm * snapshot.time / case.duration_s,
+            "punch_force_N": -row["punch_force_z_N"] * (4.0 if case.symmetry == "quarter" else 1.0),
+            "largest_shear_angle_deg": row["largest_shear_deg"],
+            "lowest_point_mm": lowest(net, snapshot.displacement),
+            "kinetic_over_stored_energy": _kinetic_share(outcome.rows),
+            "points": _points(case, net, snapshot),
+        }
+        if session.root and session.pictures:
+            _draw(case, session, model, snapshot)
+    return extend(outcome, quantities)
+
+
+def _points(case: DrapeCase, net: Net, snapshot: Snapshot) -> list[dict[str, Any]]:
+    places = np.array([[p.x_mm, p.y_mm] for p in case.points]).reshape(-1, 2)
+    if case.symmetry == "quarter":
+        places = np.abs(places)
+    angles = angles_at(net, snapshot.shear_angle, places) if len(places) else np.zeros(0)
+    return [
+        {**point.model_dump(exclude_none=True), "angle_deg": round(float(angle), 3)}
+        for point, angle in zip(case.points, angles, strict=True)
+    ]
+
+
+def _kinetic_share(rows: list[dict[str, float]]) -> float:
+    """Largest ratio of kinetic to stored energy after the first tenth of the run."""
+    late = rows[len(rows) // 10 :]
+    return max(
+        row["energy_inertia_N_mm"]
+        / max(sum(v for k, v in row.items() if k.startswith("energy_")), 1e-300)
+        for row in late
+    )
+
+
+def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
+    flat = net.points[net.crossings].mean(axis=1)
+    now = flat + snapshot.displacement[net.crossings].mean(axis=1)
+    columns = {"x0_mm": flat[:, 0], "y0_mm": flat[:, 1]}
+    columns |= {f"{axis}_mm": now[:, i] for i, axis in enumerate("xyz")}
+    columns["angle_deg"] = 90.0 - np.degrees(np.abs(snapshot.shear_angle))
+    write_table(session, "crossings.csv", columns)
+
+
+def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -> None:
+    extent = 0.62 * max(case.sheet.width_mm, case.sheet.length_mm)
+    colours = {"punch": "#8aa0b8", "die": "#b8a58a", "holder": "#cfd6dd"}
+    surfaces = [
+        RevolvedSurface(
+            tool.name, tool.profile(extent), np.asarray(tool.path(snapshot.time)), colours[tool.name]
+        )
+        for tool in model.tools
+    ]
+    depth = case.punch_travel_mm * snapshot.time / case.duration_s
+    for view, shown in (
+        ("perspective", [s for s in surfaces if s.name != "holder"]),
+        ("top", [s for s in surfaces if s.name == "die"]),
+    ):
+        draw_net(
+            session.folder / f"drape_{view}.png",
+            model.net,
+            snapshot,
+            surfaces=shown,
+            view=view,
+            title=f"punch at {depth:.0f} mm",
+            mirror=case.symmetry == "quarter",
+        )

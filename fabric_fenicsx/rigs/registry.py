@@ -1,0 +1,21 @@
+"""Which rigs there are: the keys and the runner of each test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from . import drape
+from .cases import CantileverCase, DrapeCase, PictureFrameCase
+
+__all__ = ["CASES", "RUNNERS"]
+
+CASES: dict[str, type[DrapeCase] | type[PictureFrameCase] | type[CantileverCase]] = {
+    "drape": DrapeCase,
+    "picture_frame": PictureFrameCase,
+    "cantilever": CantileverCase,
+}
+
+RUNNERS: dict[str, Callable[..., dict[str, Any]]] = {
+    "drape": drape.run,
+}
