@@ -26,9 +26,10 @@ class Value:
     source: str
 
 
-#: Drop over reach of the tip of a heavy cantilever with w L³/B = 10, and its slope at no weight.
-HEAVY_DROP_OVER_REACH_AT_10 = Value(1.0673, "heavy elastica, Peirce's cantilever, exact (ODE)")
-HEAVY_SLOPE_AT_0 = Value(1.0 / 8.0, "drop w L⁴/8B of a uniformly loaded cantilever over L, exact")
+#: Drop over length of a heavy cantilever per w L³/B, where that is small.
+HEAVY_SLOPE_AT_0 = Value(1.0 / 8.0, "drop w L⁴/8B of a uniformly loaded cantilever, beam theory")
+#: Deflection over length of a cantilever with an end force per P L²/B, where that is small.
+END_SHEAR_SLOPE_AT_0 = Value(1.0 / 3.0, "deflection P L³/3B of an end-loaded cantilever")
 
 
 def table(name: str) -> list[dict[str, str]]:

@@ -13,7 +13,12 @@ from fabric_fenicsx.solving.stepping import StepControl, Stepper
 
 @dataclass(frozen=True)
 class GivenSection:
-    """A section by its numbers: (EA, κGA, κGA, GJ, E I_out, E I_in) and (ρA, ρI about d1, d2, d3)."""
+    """A section by its numbers.
+
+    Attributes:
+        values: (EA, κGA, κGA, GJ, E I_out, E I_in).
+        masses: (ρA, ρI about d1, d2, d3).
+    """
 
     values: tuple[float, ...]
     masses: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0)
@@ -47,7 +52,7 @@ class Statics:
             self.step(1.0 / steps, keep=True)
 
     def step(self, length: float, *, keep: bool) -> None:
-        """One step; ``keep`` makes it the accepted state, else the increment stays in the fields."""
+        """One step; ``keep`` makes it the accepted state, else its increment stays in the fields."""
         outcome = self.stepper.try_step(length)
         self.outcomes.append(outcome)
         assert outcome.converged, f"step {len(self.outcomes)}: {outcome}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from . import drape
+from . import cantilever, drape, picture_frame
 from .cases import CantileverCase, DrapeCase, PictureFrameCase
 
 __all__ = ["CASES", "RUNNERS"]
@@ -18,4 +18,6 @@ CASES: dict[str, type[DrapeCase] | type[PictureFrameCase] | type[CantileverCase]
 
 RUNNERS: dict[str, Callable[..., dict[str, Any]]] = {
     "drape": drape.run,
+    "picture_frame": picture_frame.run,
+    "cantilever": cantilever.run,
 }

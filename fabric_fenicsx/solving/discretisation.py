@@ -213,8 +213,7 @@ class Discretisation:
         ones = np.ones(len(i), dtype=np.int8)
         graph = sparse.coo_matrix((ones, (i, j)), shape=(n, n)).tocsr()
         graph = (graph + graph.T + sparse.identity(n, dtype=np.int8, format="csr")).tocsr()
-        first = int(self.global_blocks[0]) if self.owned else 0
-        first = self.comm.exscan(self.owned) or 0
+        first = int(self.comm.scan(self.owned)) - self.owned
         own = graph[first : first + self.owned]
         inside = own[:, first : first + self.owned]
         diagonal = np.repeat(np.diff(inside.indptr) * BLOCK, BLOCK)

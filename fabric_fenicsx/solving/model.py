@@ -87,6 +87,7 @@ class Model:
         section: the section of all tows, or one each for warp and weft.
         crossovers: law of the crossings; not needed where the net has none.
         gravity: acceleration [mm/s²].
+        load: factor on gravity at a time; by default 1.
         inertia: time integration; None for statics.
         mass_scale: factor on the mass in the inertia forces, never on the weight.
         viscosity: relaxation time τ of bending and twist [s].
@@ -105,6 +106,7 @@ class Model:
         *,
         crossovers: CrossoverLaw | None = None,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        load: Callable[[float], float] = lambda time: 1.0,
         inertia: GeneralisedAlpha | None = None,
         mass_scale: float = 1.0,
         viscosity: float = 0.0,
@@ -122,6 +124,7 @@ class Model:
         self.crossovers, self.contact_law = crossovers, contact_law
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
         self.gravity.value[:] = gravity
+        self.full_gravity, self.load = np.array(gravity), load
         self.mass_scale.value = mass_scale
 
         terms = self._tow_terms()
@@ -157,7 +160,7 @@ class Model:
                 beam.strain_energy(tows),
             )
         ]
-        if np.any(self.gravity.value):
+        if np.any(self.full_gravity):
             terms.append(Term("weight", "tows", inertia.weight(tows, self.gravity), None))
         if self.alpha is not None:
             work = inertia.inertia(tows, self.c_0, self.c_1, self.mass_scale)
@@ -275,6 +278,7 @@ class Model:
         """Move the tools to their places at the end of the step and set what depends on Δt."""
         for tool, place in zip(self.tools, getattr(self, "_places", []), strict=True):
             place.value[:] = tool.path(end)
+        self.gravity.value[:] = self.load(end) * self.full_gravity
         self.relaxation.value = self.viscosity / (end - start)
         if self.disc.connectors is not None:
             self.per_time.value = 1.0 / (end - start)

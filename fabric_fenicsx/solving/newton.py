@@ -21,6 +21,10 @@ from .system import System
 
 __all__ = ["Newton", "Outcome"]
 
+#: A residual this many times the first one, after three iterations, will not come back: early in a
+#: step stiff tows make it rise by orders, so that growth alone is no sign.
+RUNAWAY = 1e2
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -165,6 +169,8 @@ class Newton:
             return int(reasons.DIVERGED_FNORM_NAN)
         if iteration > 0 and residual < self.force_tolerance:
             return int(reasons.CONVERGED_FNORM_ABS)
+        if iteration > 3 and residual > RUNAWAY * self._history[0]:
+            return int(reasons.DIVERGED_DTOL)
         if iteration >= self.limit:
             return int(reasons.DIVERGED_MAX_IT)
         return int(reasons.CONVERGED_ITERATING)

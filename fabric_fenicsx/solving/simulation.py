@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -45,6 +45,7 @@ def simulate(
     *,
     test: str,
     end: float,
+    stops: Sequence[float] = (),
     control: StepControl,
     force_tolerance: float,
     iteration_limit: int = 20,
@@ -60,6 +61,7 @@ def simulate(
         folder: where records go; it must exist.
         test: name of the rig.
         end: final time [s].
+        stops: times that steps must not jump over (where a prescribed motion has a corner) [s].
         control: step lengths.
         force_tolerance: residual norm at which a step is in balance [N, N mm].
         iteration_limit: Newton iterations after which a step has failed.
@@ -96,7 +98,8 @@ def simulate(
     stepper.keep = lambda step: record.keep(step, stepper)
     stop = None
     try:
-        stepper.run(end)
+        for stop_at in (*sorted(stops), end):
+            stepper.run(stop_at)
     except SolveError as error:
         stop = str(error)
     seconds = {

@@ -1,0 +1,151 @@
+"""Cantilevers: strips of fabric that bend under their own weight (Wei & Zhang, Figures 8 and 9).
+
+The weft tows run along the overhang, x, from a straight horizontal clamp at x = 0; each specimen
+is a net of its own. The weight is put on gradually; nothing moves in the end, so statics will do.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..fabric.net import WEFT, Net
+from ..fabric.sheet import Sheet, spaced_sheet
+from ..output.pictures import draw_net
+from ..output.snapshot import Snapshot
+from ..solving.model import Model, Support
+from ..solving.simulation import Run, simulate
+from ..solving.stepping import StepControl
+from .cases import CantileverCase
+from .common import Session, crossover_law, extend, section, tow_net, write_table
+
+__all__ = ["build", "midline", "run", "strip"]
+
+Array = npt.NDArray[np.float64]
+
+
+def strip(case: CantileverCase, length: float) -> Sheet:
+    """A specimen of this overhang; warp tows across it, as many as fit."""
+    return spaced_sheet(
+        (0.0, length),
+        (0.0, case.width_mm),
+        case.warp_spacing_mm,
+        case.weft_spacing_mm,
+        subdivisions=case.subdivisions,
+    )
+
+
+def build(case: CantileverCase, length: float, session: Session) -> Model:
+    """The model of one specimen; the weight grows from nothing to all of it at time 1. Collective."""
+    net = tow_net(case, strip(case, length), session)
+    clamped = np.flatnonzero(net.points[:, 0] < 1e-9 * np.ptp(net.points))
+    return Model(
+        net,
+        section(case.tow),
+        crossovers=crossover_law(case.crossover, case.warp_spacing_mm, case.weft_spacing_mm),
+        gravity=(0.0, 0.0, -case.gravity_mm_s2),
+        load=lambda time: time,
+        supports=[Support(clamped, (0, 1, 2, 3, 4, 5))],
+        comm=session.comm,
+    )
+
+
+def midline(net: Net, displacement: Array) -> tuple[Array, Array, Array]:
+    """Mean line of the hanging tows.
+
+    Returns:
+        Arc length from the clamp, x and z [mm] of the stations along them, each (n_stations,).
+    """
+    hanging = net.node_family == WEFT
+    stations, index = np.unique(np.round(net.points[hanging, 0], 9), return_inverse=True)
+    now = (net.points + displacement)[hanging]
+    count = np.bincount(index)
+    x = np.bincount(index, weights=now[:, 0]) / count
+    z = np.bincount(index, weights=now[:, 2]) / count
+    return stations, x, z
+
+
+def run(case: CantileverCase, session: Session) -> dict[str, Any]:
+    """Run all specimens and write their results. Collective.
+
+    Returns:
+        The content of result.json; it stops at the first specimen that does not finish.
+    """
+    tables: dict[str, list[Array]] = {name: [] for name in ("length_mm", "s_mm", "x_mm", "z_mm")}
+    specimens: list[dict[str, float]] = []
+    totals: dict[str, Any] = {}
+    count = len(case.lengths_mm)
+    for number, length in enumerate(case.lengths_mm):
+        model = build(case, length, session)
+        outcome = _hang(case, session, model, length, number / count, 1.0 / count)
+        totals = _add(totals, outcome)
+        if not outcome.completed or outcome.last is None:
+            break
+        last = outcome.last
+        s, x, z = midline(model.net, last.displacement)
+        columns = (np.full(len(s), length), s, x, z)
+        for name, values in zip(tables, columns, strict=True):
+            tables[name].append(values)
+        specimens.append({"length_mm": length, "tip_x_mm": float(x[-1]), "tip_z_mm": float(z[-1])})
+        if session.root and session.pictures:
+            picture = session.folder / f"cantilever_{length:g}mm.png"
+            draw_net(picture, model.net, last, colour="bending_out_of_plane")
+    joined = {name: np.concatenate(v) if v else np.zeros(0) for name, v in tables.items()}
+    write_table(session, "shape.csv", joined)
+    if session.root and session.pictures and specimens:
+        _draw(session, joined)
+    return {**totals, "quantities": {"specimens": specimens}}
+
+
+def _hang(
+    case: CantileverCase, session: Session, model: Model, length: float, begun: float, share: float
+) -> Run:
+    step = 1.0 / case.load_steps
+    folder = session.folder / f"specimen_{length:g}mm"
+    if session.root:
+        folder.mkdir(exist_ok=True)
+    session.comm.barrier()
+
+    def measure(snapshot: Snapshot) -> dict[str, float]:
+        _, x, z = midline(model.net, snapshot.displacement)
+        return {"load": snapshot.time, "tip_x_mm": float(x[-1]), "tip_z_mm": float(z[-1])}
+
+    return simulate(
+        model,
+        folder,
+        test="cantilever",
+        end=1.0,
+        control=StepControl(first=step, smallest=min(step, 1e-4), largest=step),
+        force_tolerance=case.solver.force_tolerance_N,
+        iteration_limit=case.solver.iteration_limit,
+        measure=measure,
+        progress=lambda time, number, its: session.progress(begun + share * time, number, its),
+        started=session.started,
+    )
+
+
+def _add(totals: dict[str, Any], outcome: Run) -> dict[str, Any]:
+    """Summary of all specimens so far: counts and seconds add, the rest is the last one's."""
+    summary = dict(outcome.summary)
+    if totals:
+        for key in ("steps", "newton_iterations", "wasted_iterations", "factorisations", "dofs"):
+            summary[key] += totals[key]
+        for key in ("assemble", "solve"):
+            summary["seconds"][key] += totals["seconds"][key]
+    return summary
+
+
+def _draw(session: Session, table: dict[str, Array]) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.0, 6.0), layout="constrained")
+    axes = figure.subplots()
+    for length in dict.fromkeys(table["length_mm"]):
+        own = table["length_mm"] == length
+        axes.plot(table["x_mm"][own], table["z_mm"][own], label=f"overhang {length:g} mm")
+    axes.set(xlabel="x [mm]", ylabel="z [mm]", aspect="equal")
+    axes.grid(alpha=0.3)
+    axes.legend()
+    figure.savefig(session.folder / "shape.png", dpi=150)

@@ -1,0 +1,191 @@
+"""The picture frame: pure shear (Wei & Zhang, equations 2 to 5).
+
+    γ = π/2 − 2θ,    θ = arccos((√2 L_frame + D) / (2 L_frame)),    D = L_frame (2 cos θ − √2)
+    F_normalised = F_shear L_frame / L_fabric²,    F_shear = F / (2 cos θ)
+
+The bars are rigid, the tows are pinned to them: their ends move affinely, their turns are free.
+The woven square lies in the middle; outside of it the tows run on to the bars without crossing.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..fabric.net import Net
+from ..fabric.sheet import Sheet, spaced_sheet
+from ..output.pictures import draw_net
+from ..output.snapshot import Snapshot
+from ..solving.model import Model, Support
+from ..solving.simulation import simulate
+from .cases import PictureFrameCase
+from .common import Session, control, crossover_law, extend, section, tow_net, write_table
+
+__all__ = ["build", "crosshead", "frame_angle", "frame_ends", "normalised_force", "run"]
+
+Array = npt.NDArray[np.float64]
+
+
+def frame_angle(displacement: Any, frame_length: float) -> Any:
+    """Shear angle γ [rad] at a crosshead displacement D [mm] (eqs. 2 and 3)."""
+    cosine = (np.sqrt(2.0) * frame_length + displacement) / (2.0 * frame_length)
+    return np.pi / 2.0 - 2.0 * np.arccos(cosine)
+
+
+def normalised_force(force: Any, gamma: Any, frame_length: float, fabric_length: float) -> Any:
+    """F_normalised [N/mm] of a crosshead force [N] at a shear angle (eqs. 4 and 5)."""
+    theta = np.pi / 4.0 - gamma / 2.0
+    return force / (2.0 * np.cos(theta)) * frame_length / fabric_length**2
+
+
+def crosshead(case: PictureFrameCase, time: float) -> float:
+    """Crosshead displacement D [mm]: out at a constant rate, at rest, and back."""
+    rate = case.rate_mm_min / 60.0
+    out = case.travel_mm / rate
+    if time <= out:
+        return rate * time
+    if time <= out + case.hold_s or not case.unload:
+        return case.travel_mm
+    return max(case.travel_mm - rate * (time - out - case.hold_s), 0.0)
+
+
+def duration(case: PictureFrameCase) -> float:
+    """Length of the whole test [s]."""
+    out = 60.0 * case.travel_mm / case.rate_mm_min
+    return out + case.hold_s + (out if case.unload else 0.0)
+
+
+def woven_sheet(case: PictureFrameCase) -> Sheet:
+    """Tows over the whole frame, crossing in the square of side L_fabric in its middle."""
+    frame, fabric = case.frame_length_mm, case.fabric_length_mm
+    middle = ((frame - fabric) / 2.0, (frame + fabric) / 2.0)
+    woven = spaced_sheet(
+        middle, middle, case.warp_spacing_mm, case.weft_spacing_mm, subdivisions=case.subdivisions
+    )
+    return Sheet(
+        (0.0, frame),
+        (0.0, frame),
+        woven.warp_positions,
+        woven.weft_positions,
+        subdivisions=case.subdivisions,
+    )
+
+
+def directions(gamma: float) -> tuple[Array, Array]:
+    """Where the frame's sides along x and y point: symmetric about the diagonal."""
+    half = gamma / 2.0
+    return np.array([np.cos(half), np.sin(half), 0.0]), np.array([np.sin(half), np.cos(half), 0.0])
+
+
+def frame_ends(net: Net, case: PictureFrameCase, place: Any = crosshead) -> Support:
+    """The tow ends on the bars, moved affinely by the crosshead ``place(case, time)``."""
+    nodes = net.ends.ravel()
+    X = net.points[nodes]
+
+    def displacement(time: float) -> Array:
+        e1, e2 = directions(frame_angle(place(case, time), case.frame_length_mm))
+        return X[:, :1] * e1 + X[:, 1:2] * e2 - X * [1.0, 1.0, 0.0]
+
+    return Support(nodes, (0, 1, 2), displacement)
+
+
+def build(case: PictureFrameCase, session: Session) -> Model:
+    """The model of a picture frame. Collective."""
+    net = tow_net(case, woven_sheet(case), session)
+    return Model(
+        net,
+        section(case.tow),
+        crossovers=crossover_law(case.crossover, case.warp_spacing_mm, case.weft_spacing_mm),
+        viscosity=case.tow.relaxation_time_s,
+        supports=[frame_ends(net, case)],
+        comm=session.comm,
+    )
+
+
+def crosshead_force(model: Model, gamma: float, frame_length: float) -> float:
+    """Force [N] of the crosshead that does the work of the reactions: F dD = Σ R · dx.
+
+    With the ends at X e1 + Y e2, dx/dγ = X e1′ + Y e2′ and dD/dγ = L_frame sin θ.
+    """
+    nodes = model.net.ends.ravel()
+    X = model.net.points[nodes]
+    half = gamma / 2.0
+    s, c = np.sin(half) / 2.0, np.cos(half) / 2.0
+    rate = X[:, :1] * [-s, c, 0.0] + X[:, 1:2] * [c, -s, 0.0]
+    work = float(np.sum(model.reactions()[nodes, :3] * rate))
+    return work / (frame_length * np.sin(np.pi / 4.0 - half))
+
+
+def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
+    """Run a picture frame and write its results. Collective.
+
+    Returns:
+        The content of result.json.
+    """
+    model = build(case, session)
+    frame, fabric = case.frame_length_mm, case.fabric_length_mm
+    end = duration(case)
+
+    def measure(snapshot: Snapshot) -> dict[str, float]:
+        D = crosshead(case, snapshot.time)
+        gamma = float(frame_angle(D, frame))
+        force = crosshead_force(model, gamma, frame)
+        return {
+            "displacement_mm": D,
+            "force_N": force,
+            "shear_angle_deg": float(np.degrees(gamma)),
+            "normalised_force_N_mm": float(normalised_force(force, gamma, frame, fabric)),
+            "largest_out_of_plane_mm": float(np.abs(snapshot.displacement[:, 2]).max()),
+        }
+
+    out = 60.0 * case.travel_mm / case.rate_mm_min
+    turns = (out, out + case.hold_s) if case.hold_s else (out,)
+    outcome = simulate(
+        model,
+        session.folder,
+        test="picture_frame",
+        end=end,
+        stops=[t for t in turns if t < end],
+        control=control(case.solver),
+        force_tolerance=case.solver.force_tolerance_N,
+        iteration_limit=case.solver.iteration_limit,
+        measure=measure,
+        progress=lambda time, step, its: session.progress(time / end, step, its),
+        resume=session.resume,
+        started=session.started,
+    )
+    rows = outcome.rows
+    names = ("displacement_mm", "force_N", "shear_angle_deg", "normalised_force_N_mm")
+    columns = {"time_s": np.array([row["time_s"] for row in rows])}
+    columns |= {name: np.array([row[name] for row in rows]) for name in names}
+    write_table(session, "curve.csv", columns)
+    quantities: dict[str, Any] = {}
+    if outcome.last is not None:
+        peak = max(rows, key=lambda row: row["force_N"])
+        quantities = {
+            "peak_force_N": peak["force_N"],
+            "peak_normalised_force_N_mm": peak["normalised_force_N_mm"],
+            "largest_shear_angle_deg": max(row["shear_angle_deg"] for row in rows),
+            "largest_out_of_plane_mm": max(row["largest_out_of_plane_mm"] for row in rows),
+        }
+        if session.root and session.pictures:
+            _draw(session, model, outcome.last, columns)
+    return extend(outcome, quantities)
+
+
+def _draw(session: Session, model: Model, last: Snapshot, columns: dict[str, Array]) -> None:
+    from matplotlib.figure import Figure
+
+    draw_net(session.folder / "picture_frame.png", model.net, last, view="top")
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    against_angle, against_time = figure.subplots(1, 2)
+    force = columns["normalised_force_N_mm"]
+    against_angle.plot(columns["shear_angle_deg"], force)
+    against_angle.set(xlabel="shear angle [°]", ylabel="normalised shear force [N/mm]")
+    against_time.plot(columns["time_s"], force)
+    against_time.set(xlabel="time [s]")
+    for axes in (against_angle, against_time):
+        axes.grid(alpha=0.3)
+    figure.savefig(session.folder / "curve.png", dpi=150)
