@@ -25,7 +25,7 @@ def numbers(expression):
 
 
 def skew(v):
-    return np.cross(np.eye(3), v).T @ -np.eye(3)
+    return -np.cross(np.eye(3), v).T
 
 
 def quaternion(axis, angle):

@@ -83,8 +83,10 @@ class System:
 
         Args:
             x: the step's increment (Δu, θ) of all nodes.
-            linearise_from: "zero" linearises about the start of the step, "last" about the w of
-                the last call (one Newton step ago), None leaves the forces alone.
+            linearise_from: "zero" takes the forces at the start of the step, "last" linearises
+                about the w of the last call (one Newton step ago), None leaves the forces alone.
+                A guess x is never linearised about the start: its stretch of second order times
+                EA would be a large geometric stiffness of no meaning.
         """
         net = self.net
         w = net.tows.w
@@ -92,8 +94,10 @@ class System:
         if linearise_from == "zero":
             w.x.array[:] = 0.0
         if linearise_from is not None:
-            self._dw.x.array[:own] = x.array_r - w.x.array[:own]
-            self._dw.x.scatter_forward()
+            self._dw.x.array[:] = 0.0
+            if linearise_from == "last":
+                self._dw.x.array[:own] = x.array_r - w.x.array[:own]
+                self._dw.x.scatter_forward()
             s = net.tows.section_forces.x
             s.array[:] = 0.0
             _dolfinx.add_vector(s.array, self._forces)
