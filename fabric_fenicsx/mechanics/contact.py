@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ufl import conditional, lt, max_value, sqrt
+from ufl import conditional, lt, max_value, min_value, sqrt
 
 from .fields import TowFields
 
@@ -53,6 +53,9 @@ def plate_with_hole(x: Any, centre: Any, hole_radius: Any, edge_radius: Any, sid
     """
     r = x - centre
     rho = root(r[0] ** 2 + r[1] ** 2)
-    inward = max_value(hole_radius + edge_radius - rho, 0.0)
-    upward = max_value(side * r[2] + edge_radius, 0.0)
-    return root(inward**2 + upward**2) - edge_radius
+    inward = hole_radius + edge_radius - rho
+    upward = side * r[2] + edge_radius
+    outside = root(max_value(inward, 0.0) ** 2 + max_value(upward, 0.0) ** 2)
+    # Deep inside, the nearest face still pulls: a node thrown through by a long step comes back.
+    inside = min_value(max_value(inward, upward), 0.0)
+    return outside + inside - edge_radius
