@@ -1,8 +1,9 @@
 """Reference values with their sources, and reference solutions that share no code with the package.
 
-The published numbers stand in tests/data with table and row. The solutions here are plane elasticas
-(inextensible, rigid in shear) as initial value problems in the angle θ [rad] between tangent and
-root direction, integrated from the free tip, where the curvature vanishes, to the clamp.
+The published numbers stand in tests/data with table and row. The plane elasticas (inextensible,
+rigid in shear) are initial value problems in the angle θ [rad] between tangent and root direction,
+integrated from the free tip, where the curvature vanishes, to the clamp. The curved beam in space
+is shooting on the moment at its clamp, with rotation matrices.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, fsolve
 
 DATA = Path(__file__).parent / "data"
 
@@ -75,3 +76,46 @@ def heavy_cantilever(weight: float) -> tuple[float, float]:
     B θ'(s) = w ∫ (x(u) − x(s)) du over the part beyond s, so B θ'' = −w (L − s) cos θ.
     """
     return _tip(lambda sigma, theta: weight * sigma * np.cos(theta), 1.0)
+
+
+def curved_cantilever(radius, angle, stiffness, force, steps: int = 4):
+    """Tip displacement of a circular cantilever under a dead tip force.
+
+    It leaves the origin along y and turns towards x. r' = R (E1 + Γ), R' = R K^, m' = f × r' with
+    Γ = C_Γ⁻¹ Rᵀ f and K = K_0 + C_K⁻¹ Rᵀ m (Simo 1985); m vanishes at the tip.
+
+    Args:
+        radius: of the circle.
+        angle: of the arc [rad].
+        stiffness: (EA, GA, GA, GJ, EI about d2, EI about d3), d3 along z.
+        force: at the tip, along x, y and z.
+        steps: of the load, each from the clamp moment of the last.
+
+    Returns:
+        Displacement along x, y and z.
+    """
+    C = np.asarray(stiffness, dtype=float)
+    # d1 = y, d3 = z, d2 = d3 × d1 = −x; the tangent turns about −z.
+    start = np.column_stack([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    K_0 = np.array([0.0, 0.0, -1.0 / radius])
+
+    def end(moment, f):
+        def rates(s, y):
+            R = y[3:12].reshape(3, 3)
+            K = K_0 + R.T @ y[12:] / C[3:]
+            dr = R @ ([1.0, 0.0, 0.0] + R.T @ f / C[:3])
+            return np.concatenate([dr, np.cross(R, K).ravel(), np.cross(f, dr)])
+
+        # Rows of R K^ are R_i × K, for R_i K^ v = R_i · (K × v) = (R_i × K) · v.
+        y = np.concatenate([np.zeros(3), start.ravel(), moment])
+        length = radius * angle
+        return solve_ivp(rates, (0.0, length), y, method="DOP853", rtol=1e-11, atol=1e-11).y[:, -1]
+
+    moment = np.zeros(3)
+    for part in np.arange(1, steps + 1) / steps:
+        f = part * np.asarray(force, dtype=float)
+        scale = np.linalg.norm(f) * radius
+        moment = fsolve(lambda m, f=f, scale=scale: end(m, f)[12:] / scale, moment, xtol=1e-12)
+    last = end(moment, f)
+    assert np.abs(last[12:]).max() < 1e-8 * scale
+    return last[:3] - radius * np.array([1.0 - np.cos(angle), np.sin(angle), 0.0])

@@ -52,7 +52,7 @@ class Statics:
             self.step(1.0 / steps, keep=True)
 
     def step(self, length: float, *, keep: bool) -> None:
-        """One step; ``keep`` makes it the accepted state, else its increment stays in the fields."""
+        """One step; ``keep`` makes it the accepted state, else it stays an increment."""
         outcome = self.stepper.try_step(length)
         self.outcomes.append(outcome)
         assert outcome.converged, f"step {len(self.outcomes)}: {outcome}"

@@ -39,9 +39,9 @@ def test_elasticas_at_small_loads():
 
 
 def test_elastica_against_the_printed_table():
-    # P L²/B = 4 P/Pmax for the table's beam: B = 1.2e6 0.1³/12 = 100, L = 10, Pmax = 4. The table is
-    # a shell solution on a mesh of finite size and prints three decimals: it lies up to 0.0035 below
-    # the elastica, never above it by more than the rounding.
+    # P L²/B = 4 P/Pmax for the table's beam: B = 1.2e6 0.1³/12 = 100, L = 10, Pmax = 4. The table
+    # is a shell solution on a mesh of finite size and prints three decimals: it lies up to 0.0035
+    # below the elastica, never above it by more than the rounding.
     rows = reference.table("cantilever_end_shear.csv")
     assert len(rows) == 20
     for row in rows:
@@ -51,3 +51,15 @@ def test_elastica_against_the_printed_table():
             (10.0 * deflection, float(row["deflection"])),
         ):
             assert -0.0005 <= exact - printed <= 0.004, f"{row}: elastica {exact:.5f}"
+
+
+def test_curved_cantilever_at_a_small_force():
+    # Castigliano for a force P out of the plane of an arc of 90 degrees: at the angle φ from the
+    # tip the bending moment is P R sin φ, the torque P R (1 − cos φ), and the shear P, so
+    # u = P R³ (π/4)/EI + P R³ (3π/4 − 2)/GJ + P R (π/2)/GA.
+    EI, GJ, GA, R, P = 80.0, 30.0, 50.0, 10.0, 1e-5
+    stiffness = (1e3, GA, GA, GJ, EI, 2.0 * EI)
+    u = reference.curved_cantilever(R, np.pi / 2.0, stiffness, (0.0, 0.0, P), steps=1)
+    bending, torsion = np.pi / 4.0 / EI, (3.0 * np.pi / 4.0 - 2.0) / GJ
+    expected = P * R**3 * (bending + torsion) + P * R * np.pi / 2.0 / GA
+    assert u[2] == pytest.approx(expected, rel=1e-5)

@@ -3,6 +3,8 @@
 UFL expressions of plain numbers are evaluated as they are, without compiling anything.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import ufl
@@ -37,39 +39,18 @@ def rng():
     return np.random.default_rng(20240501)
 
 
-class Symbolic:
-    """The functions of mechanics.rotations on single rows of numbers."""
+def on_rows(module, convert, result):
+    """cayley, compose and rotate of a module on single rows of numbers."""
 
-    @staticmethod
-    def cayley(theta):
-        return numbers(symbolic.cayley(vec(theta)))
+    def wrapped(name):
+        return lambda *rows: result(getattr(module, name)(*map(convert, rows)))
 
-    @staticmethod
-    def compose(p, q):
-        return numbers(symbolic.compose(vec(p), vec(q)))
-
-    @staticmethod
-    def rotate(q, v):
-        return numbers(symbolic.rotate(vec(q), vec(v)))
+    return SimpleNamespace(**{name: wrapped(name) for name in ("cayley", "compose", "rotate")})
 
 
-class Arrays:
-    """The functions of solving.update on single rows of numbers."""
-
-    @staticmethod
-    def cayley(theta):
-        return arrays.cayley(np.array([theta]))[0]
-
-    @staticmethod
-    def compose(p, q):
-        return arrays.compose(np.array([p]), np.array([q]))[0]
-
-    @staticmethod
-    def rotate(q, v):
-        return arrays.rotate(np.array([q]), np.array([v]))[0]
-
-
-both = pytest.mark.parametrize("of", [Symbolic, Arrays])
+Symbolic = on_rows(symbolic, vec, numbers)
+Arrays = on_rows(arrays, lambda row: np.array([row]), lambda rows: rows[0])
+both = pytest.mark.parametrize("of", [Symbolic, Arrays], ids=["ufl", "arrays"])
 
 
 def test_skew():
