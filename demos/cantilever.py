@@ -5,7 +5,8 @@
 #
 # $$ B \theta'' = -w (L - s) \cos\theta, \qquad \theta(0) = 0, \quad \theta'(L) = 0, $$
 #
-# with θ the slope downwards, which is solved here by scipy and laid beside the net of beams for the paper's three overhangs.
+# with θ the slope downwards. Scipy solves it here, and the net of beams is laid beside it for the
+# paper's three overhangs.
 #
 # ```
 # python demos/cantilever.py                # or: mpirun -n 2 python demos/cantilever.py

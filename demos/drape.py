@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Draping a plain weave over a hemisphere
 #
-# The experiment of Wei & Zhang, built from the parts of the package rather than from a case file, so
-# that each part can be exchanged: the sheet, the section, the crossings, the tools, their motion.
+# The experiment of Wei & Zhang, built from the parts of the package rather than from a case file:
+# each part can be exchanged: the sheet, the section, the crossings, the tools and their motion.
 #
 # ```
 # python demos/drape.py                # or: mpirun -n 2 python demos/drape.py

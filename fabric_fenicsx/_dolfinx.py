@@ -132,7 +132,7 @@ def constants_per_cell(mesh: Any, size: int) -> Any:
 
 
 def constant(mesh: Any, value: float | tuple[float, ...]) -> Any:
-    """A number or vector that forms on ``mesh`` read when assembled; set ``.value`` to change it."""
+    """A number or vector that forms on ``mesh`` read when assembled, from its ``.value``."""
     return fem.Constant(
         mesh,
         PETSc.ScalarType(value)

@@ -8,6 +8,6 @@ class InputError(Exception):
 
 
 class SolveError(Exception):
-    """A solve that could not go on: says where and why; accepted steps stay on disk. Exit code 1."""
+    """A solve that could not go on, where and why; accepted steps stay on disk. Exit code 1."""
 
     exit_code = 1

@@ -93,9 +93,9 @@ class Net:
     @property
     def node_lengths(self) -> npt.NDArray[np.float64]:
         """Tow length that each node stands for [mm]: half of each cell it ends, (n_nodes,)."""
-        return np.bincount(
-            self.cells.ravel(), weights=np.repeat(self.lengths / 2.0, 2), minlength=len(self.points)
-        )
+        share = np.zeros(len(self.points))
+        np.add.at(share, self.cells.ravel(), np.repeat(self.lengths / 2.0, 2))
+        return share
 
 
 def single_tow(

@@ -1,4 +1,4 @@
-"""A model is a sum of terms; a term is one effect: an energy or a virtual work on one of the meshes.
+"""A model is a sum of terms; a term is one effect: an energy or a virtual work on one mesh.
 
 A new effect is a new Term with an amplitude (a dolfinx Constant, or a field constant per cell)
 that the rest of the model need not know of.

@@ -24,8 +24,15 @@ Path = Callable[[float], tuple[float, float, float]]
 class Tool(Protocol):
     """What contact needs to know of a tool."""
 
-    name: str
-    path: Path
+    @property
+    def name(self) -> str:
+        """What records and pictures call it."""
+        ...
+
+    @property
+    def path(self) -> Path:
+        """Where its reference point is at a time."""
+        ...
 
     def numbers(self) -> dict[str, float]:
         """The shape's parameters, each of which becomes a constant of the form."""

@@ -19,7 +19,7 @@ from ..solving.model import Model, Support
 from ..solving.simulation import Run, simulate
 from ..solving.stepping import StepControl
 from .cases import CantileverCase
-from .common import Session, crossover_law, extend, section, tow_net, write_table
+from .common import Session, crossover_law, section, tow_net, write_table
 
 __all__ = ["build", "midline", "run", "strip"]
 
@@ -38,7 +38,7 @@ def strip(case: CantileverCase, length: float) -> Sheet:
 
 
 def build(case: CantileverCase, length: float, session: Session) -> Model:
-    """The model of one specimen; the weight grows from nothing to all of it at time 1. Collective."""
+    """The model of one specimen; its weight grows from nothing to all at time 1. Collective."""
     net = tow_net(case, strip(case, length), session)
     clamped = np.flatnonzero(net.points[:, 0] < 1e-9 * np.ptp(net.points))
     return Model(

@@ -157,7 +157,8 @@ class DrapeCase(Common):
     duration_s: Positive = Field(60.0, description="time of the draw")
     holder_gap_start_mm: float = Field(1.0, description="between holder and die at the start")
     holder_gap_mm: float = Field(
-        -0.2, description="between holder and die when closed; below zero the contact layers overlap"
+        -0.2,
+        description="between holder and die when closed; below zero the contact layers overlap",
     )
     holder_closing_s: Positive = Field(6.0, description="time the holder takes to close")
     punch_offset_x_mm: float = Field(0.0, description="punch axis from the sheet's centre")

@@ -189,7 +189,10 @@ def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -
     colours = {"punch": "#8aa0b8", "die": "#b8a58a", "holder": "#cfd6dd"}
     surfaces = [
         RevolvedSurface(
-            tool.name, tool.profile(extent), np.asarray(tool.path(snapshot.time)), colours[tool.name]
+            tool.name,
+            tool.profile(extent),
+            np.asarray(tool.path(snapshot.time)),
+            colours[tool.name],
         )
         for tool in model.tools
     ]

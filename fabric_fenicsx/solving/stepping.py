@@ -165,7 +165,7 @@ class Stepper:
         self.observe, self.keep = observe, keep
         self.alpha = model.alpha
         self.net = model.disc
-        self.state = State(0.0, *(np.zeros((len(self.net.local_nodes), 6)) for _ in range(4)))
+        self.state = _at_rest(len(self.net.local_nodes))
         self.number = 0
         self.failures = 0
         self.wasted_iterations = 0
@@ -214,7 +214,7 @@ class Stepper:
         model.set_time(state.time, state.time + h)
         if self.alpha is not None:
             model.set_rates(*self.alpha.rates(h))
-            v_star, a_star = self._known_rates(h)
+            v_star, a_star, _ = self._known_rates(self.alpha, h)
             net.tows.rate_star.x.array[:] = v_star.ravel()
             net.tows.acceleration_star.x.array[:] = a_star.ravel()
         # The guess goes on as the last step went.
@@ -227,27 +227,28 @@ class Stepper:
         state, w = self.state, self.net.tows.w.x.array.reshape(-1, 6)
         self.model.remember()
         if self.alpha is not None:
-            m = self.alpha
-            c_0, c_1 = m.rates(h)
-            v_star, a_star = self._known_rates(h)
-            a = (w - self._drift(h)) / (m.beta * h**2)
+            c_0, c_1 = self.alpha.rates(h)
+            v_star, a_star, drift = self._known_rates(self.alpha, h)
+            a = (w - drift) / (self.alpha.beta * h**2)
             state.v, state.vdot, state.a = c_1 * w + v_star, c_0 * w + a_star, a
         state.previous = w.copy()
         state.previous_step = h
         state.time += h
         self.net.everywhere(_advance_fields)
 
-    def _drift(self, h: float) -> Array:
-        return h * self.state.v + (0.5 - self.alpha.beta) * h**2 * self.state.a
-
-    def _known_rates(self, h: float) -> tuple[Array, Array]:
-        """v* and a*: the parts of velocity and acceleration known before the step."""
-        m, s = self.alpha, self.state
+    def _known_rates(self, m: GeneralisedAlpha, h: float) -> tuple[Array, Array, Array]:
+        """v*, a* and the part of w known before the step, h v_n + (1/2 − β) h² a_n."""
+        s = self.state
         c_0, c_1 = m.rates(h)
-        drift = self._drift(h)
+        drift = h * s.v + (0.5 - m.beta) * h**2 * s.a
         v_star = s.v + (1.0 - m.gamma) * h * s.a - c_1 * drift
         a_star = (m.alpha_m * s.a - m.alpha_f * s.vdot) / (1.0 - m.alpha_f) - c_0 * drift
-        return v_star, a_star
+        return v_star, a_star, drift
+
+
+def _at_rest(blocks: int) -> State:
+    v, vdot, a, previous = (np.zeros((blocks, 6)) for _ in range(4))
+    return State(0.0, v, vdot, a, previous)
 
 
 def _advance_fields(fields: Any) -> None:
