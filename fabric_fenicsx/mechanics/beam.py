@@ -34,6 +34,7 @@ __all__ = [
     "cell_values",
     "linear_section",
     "linearised_forces",
+    "node_sums",
     "strain",
     "strain_energy",
     "viscous_section",
@@ -117,3 +118,8 @@ def linearised_forces(
 def cell_values(fields: TowFields, f: Any, space: Any) -> Any:
     """A linear form whose vector over a space constant in each cell is f in the middle of each."""
     return inner(f, TestFunction(space)) / CellVolume(fields.mesh) * fields.middle
+
+
+def node_sums(fields: TowFields, f: Any, space: Any) -> Any:
+    """A linear form whose vector over a linear space is f at each node times its tow length."""
+    return inner(f, TestFunction(space)) * fields.nodes

@@ -1,6 +1,7 @@
-"""Contact of the tows with rigid tools, frictionless, in the nodes.
+"""Contact of the tows with rigid tools, in the nodes.
 
-    E = ∫ ψ(d) ds,   d = penetration = −signed distance
+    E = ∫ ψ(d) ds,   d = penetration = −signed distance                        (pressure)
+    t = T min(1, μ p/|T|),   T = P (t_n + k_t (Δu − Δtool)),   P = 1 − n⊗n      (Coulomb friction)
 
 ψ grows with d³ over a first layer δ, then with d²: the force per length k d²/(2δ), then
 k (d − δ/2), is continuous with its first derivative. With a corner in it Newton falls into a cycle
@@ -11,15 +12,25 @@ from __future__ import annotations
 
 from typing import Any
 
-from ufl import conditional, lt, max_value, min_value, sqrt
+from ufl import conditional, diff, dot, lt, max_value, min_value, sqrt, variable
 
-from .fields import TowFields
+from .fields import TowFields, translation_part
 
-__all__ = ["contact_energy", "plate_with_hole", "sphere"]
+__all__ = [
+    "contact_energy",
+    "friction_traction",
+    "plate_with_hole",
+    "pressure",
+    "sphere",
+    "traction_work",
+]
 
 #: Length [mm] that rounds the roots of the distance functions where they have a corner (on the
 #: tool's axis, and in the core of the rounded edge, which no fabric reaches).
 ROUNDING = 1e-4
+
+#: Traction [N/mm] below which no friction is felt: keeps the direction of slip defined.
+TINY_TRACTION = 1e-12
 
 
 def contact_energy(fields: TowFields, distance: Any, stiffness: Any, layer: Any) -> Any:
@@ -31,6 +42,48 @@ def contact_energy(fields: TowFields, distance: Any, stiffness: Any, layer: Any)
     soft = stiffness * d**3 / (6 * layer)
     firm = stiffness * ((d - layer / 2) ** 2 / 2 + layer**2 / 24)
     return conditional(lt(d, layer), soft, firm) * fields.nodes
+
+
+def pressure(d: Any, stiffness: Any, layer: Any) -> Any:
+    """Force per tow length [N/mm] at a penetration d >= 0 [mm], ψ′(d)."""
+    return conditional(lt(d, layer), stiffness * d**2 / (2 * layer), stiffness * (d - layer / 2))
+
+
+def friction_traction(
+    fields: TowFields,
+    distance: Any,
+    law: tuple[Any, Any],
+    friction: tuple[Any, Any],
+    traction_n: Any,
+    shift: Any,
+) -> Any:
+    """Friction force per tow length [N/mm] by return mapping, acting against the slip.
+
+    Below the limit μ p the node sticks by a stiffness k_t [N/mm²], whose stretch is remembered
+    from step to step; above it the traction is cut to the limit.
+
+    Args:
+        fields: of the tows.
+        distance: signed distance of the tool.
+        law: stiffness and layer of the pressure law.
+        friction: μ [-] and k_t [N/mm²].
+        traction_n: traction at the start of the step [N/mm].
+        shift: displacement of the tool over the step [mm].
+    """
+    mu, k_t = friction
+    x = variable(fields.position)
+    gap = distance(x)
+    n = diff(gap, x)
+    trial = traction_n + k_t * (translation_part(fields.w) - shift)
+    trial = trial - dot(trial, n) * n
+    size = sqrt(dot(trial, trial) + TINY_TRACTION**2)
+    p = pressure(max_value(-gap, 0.0), *law)
+    return trial * min_value(1.0, mu * p / size)
+
+
+def traction_work(fields: TowFields, traction: Any) -> Any:
+    """Virtual work ∫ t · δu ds of a traction that acts against the displacement."""
+    return dot(traction, translation_part(fields.test)) * fields.nodes
 
 
 def root(a: Any) -> Any:

@@ -1,18 +1,16 @@
 """Crossovers: what joins a warp and a weft tow where they cross (Wei & Zhang, Figure 1b).
 
-Three translational springs, an in-plane rotational spring and a rotary dashpot, and a term that
-keeps the two sheet normals aligned: with the in-plane spring alone a tow could spin freely about
-its own axis. Each law is a few lines; the amplitude is a constant or a value per crossing.
+Three translational springs, in-plane moments M(γ, γ̇, ...) from mechanics.shear_laws, and a term
+that keeps the two sheet normals aligned: with the in-plane spring alone a tow could spin freely
+about its own axis.
 
     F = k Δ                       translational springs, the same k in x, y and z
-    M = k1 γ + k3 γ³              rotational spring in the plane
-    M = β γ̇                       rotary dashpot in the plane
+    R = M δγ                      springs, dashpots and friction in the plane
     ψ = k_a (1 − n_warp · n_weft) alignment of the normals
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from ufl import TestFunction, cross, derivative, dot, sqrt
@@ -24,11 +22,9 @@ from .rotations import rotate
 __all__ = [
     "alignment_energy",
     "crossing_values",
-    "dashpot_moment",
     "opening_energy",
     "rotational_energy",
     "shear_angle",
-    "spring_moment",
     "turning_work",
 ]
 
@@ -51,24 +47,9 @@ def opening_energy(fields: ConnectorFields, k: Any) -> Any:
     return k * dot(gap, gap) / 2 * fields.point
 
 
-def spring_moment(gamma: Any, k1: Any, k3: Any) -> Any:
-    """Moment of the in-plane spring, k1 γ + k3 γ³ [N mm], odd in γ."""
-    return k1 * gamma + k3 * gamma**3
-
-
-def dashpot_moment(gamma: Any, beta: Any, gamma_n: Any, per_time: Any) -> Any:
-    """Moment of the rotary dashpot, β γ̇ [N mm].
-
-    γ̇ is the change over the step times ``per_time`` = 1/Δt: by this difference quotient the
-    moment vanishes at once when the motion stops.
-    """
-    return beta * (gamma - gamma_n) * per_time
-
-
-def turning_work(fields: ConnectorFields, moment: Callable[[Any], Any]) -> Any:
+def turning_work(fields: ConnectorFields, moment: Any, gamma: Any) -> Any:
     """Virtual work M δγ of an in-plane moment M(γ) at the crossings."""
-    gamma = shear_angle(fields, fields.w)
-    return moment(gamma) * derivative(gamma, fields.w, fields.test) * fields.point
+    return moment * derivative(gamma, fields.w, fields.test) * fields.point
 
 
 def rotational_energy(fields: ConnectorFields, k1: Any, k3: Any) -> Any:

@@ -74,10 +74,14 @@ class SheetKeys(Keys):
 
 
 class ContactKeys(Keys):
-    """Pressure law between tows and tools."""
+    """Pressure and friction between tows and tools."""
 
     stiffness_N_mm2: Positive = Field(0.5, description="force per tow length and penetration")
     layer_mm: Positive = Field(0.5, description="penetration over which the stiffness builds up")
+    friction: NotNegative = Field(0.0, description="Coulomb coefficient; 0 for oiled tools")
+    stick_stiffness_N_mm2: Positive = Field(
+        0.5, description="friction force per tow length and stretch of the stick"
+    )
 
 
 class SolverKeys(Keys):

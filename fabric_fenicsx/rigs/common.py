@@ -19,7 +19,7 @@ from ..fabric.gmsh_io import read_msh, write_msh
 from ..fabric.net import Net
 from ..fabric.section import RectangularSection
 from ..fabric.sheet import Sheet
-from ..solving.model import CrossoverLaw
+from ..solving.parts import CrossoverLaw
 from ..solving.simulation import Run
 from ..solving.stepping import StepControl
 from .cases import Common, CrossoverKeys, SolverKeys, TowKeys

@@ -17,10 +17,11 @@ from ..fabric.sheet import Sheet, centred_sheet
 from ..mechanics.tools import HoledPlate, Sphere, Tool
 from ..output.pictures import RevolvedSurface, draw_net
 from ..output.snapshot import Snapshot
-from ..solving.model import ContactLaw, Model, Support
+from ..solving.model import Model, Support
+from ..solving.parts import ContactLaw
 from ..solving.simulation import Run, simulate
 from ..solving.stepping import GeneralisedAlpha
-from .cases import DrapeCase
+from .cases import ContactKeys, DrapeCase
 from .common import Session, control, crossover_law, extend, lowest, section, tow_net, write_table
 
 __all__ = ["angles_at", "build", "flat_sheet", "run", "tools"]
@@ -68,6 +69,13 @@ def symmetry_planes(net: Net) -> list[Support]:
     return planes
 
 
+def contact_law(keys: ContactKeys) -> ContactLaw:
+    """Pressure and friction law of the case."""
+    return ContactLaw(
+        keys.stiffness_N_mm2, keys.layer_mm, keys.friction, keys.stick_stiffness_N_mm2
+    )
+
+
 def build(case: DrapeCase, session: Session) -> Model:
     """The model of a drape case. Collective."""
     net = tow_net(case, flat_sheet(case), session)
@@ -81,7 +89,7 @@ def build(case: DrapeCase, session: Session) -> Model:
         mass_scale=case.solver.mass_scale,
         viscosity=case.tow.relaxation_time_s,
         tools=tools(case),
-        contact_law=ContactLaw(case.contact.stiffness_N_mm2, case.contact.layer_mm),
+        contact_law=contact_law(case.contact),
         supports=symmetry_planes(net) if case.symmetry == "quarter" else (),
         comm=session.comm,
     )

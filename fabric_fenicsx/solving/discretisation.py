@@ -182,6 +182,11 @@ class Discretisation:
         field.x.array.reshape(-1, values.shape[1])[dofs] = values[self.local_cells]
         return field
 
+    def cell_values(self, field: Any) -> Array:
+        """Values of a field constant per cell at this rank's cells, (n_local_cells, size)."""
+        dofs = _dolfinx.cell_dofs(field.function_space)[:, 0]
+        return field.x.array.reshape(len(dofs), -1)[dofs]
+
     def crossing_field(self, space: Any, values: Array) -> Function:
         """A connector field from values per crossing of the net, shape (n_crossings, size)."""
         field = Function(space)

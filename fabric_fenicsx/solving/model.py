@@ -11,56 +11,26 @@ from petsc4py import PETSc
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx.fem import Function
 
 from .. import _dolfinx
 from ..fabric.net import Net
 from ..fabric.section import RectangularSection
-from ..mechanics import beam, contact, crossover, inertia
+from ..mechanics import beam, inertia
 from ..mechanics.fields import ConnectorFields, TowFields
-from ..mechanics.terms import Term, energy_term, work_term
+from ..mechanics.terms import Term, work_term
 from ..mechanics.tools import Tool
 from ..output.snapshot import Snapshot
 from .discretisation import BLOCK, Discretisation
+from .history import Histories
 from .newton import Newton
+from .parts import ContactLaw, Contacts, Crossings, CrossoverLaw
 from .stepping import GeneralisedAlpha
 from .system import System
 from .update import rotate
 
-__all__ = ["ContactLaw", "CrossoverLaw", "Model", "Support"]
+__all__ = ["Model", "Support"]
 
 Array = npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class CrossoverLaw:
-    """What joins warp and weft at every crossing.
-
-    Attributes:
-        translation: k of the three translational springs [N/mm].
-        k1, k3: in-plane spring M = k1 γ + k3 γ³ [N mm].
-        dashpot: β of M = β γ̇ [N mm s].
-        alignment: restoring moment of the sheet normals per sine of their tilt [N mm].
-    """
-
-    translation: float
-    k1: float
-    k3: float
-    dashpot: float
-    alignment: float
-
-
-@dataclass(frozen=True, slots=True)
-class ContactLaw:
-    """Pressure between tows and tools, see mechanics.contact.
-
-    Attributes:
-        stiffness: force per tow length and penetration [N/mm²].
-        layer: penetration over which the stiffness builds up [mm].
-    """
-
-    stiffness: float
-    layer: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,32 +90,38 @@ class Model:
         family = net.tow_family[net.cell_tow]
         stiffness = np.array([s.stiffness() for s in pair])[family]
         mass = np.array([s.mass() for s in pair])[family]
-        self.build(net, stiffness, mass, comm)
-        self.crossovers, self.contact_law = crossovers, contact_law
-        self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
-        self.gravity.value[:] = gravity
-        self.full_gravity, self.load = np.array(gravity), load
-        self.mass_scale.value = mass_scale
-
-        terms = self._tow_terms()
-        if len(net.crossings):
-            if crossovers is None:
-                raise ValueError("a net with crossings needs a law for them")
-            terms += self._crossover_terms(crossovers)
-        terms += [self._contact_term(tool) for tool in self.tools]
-        if extra is not None:
-            terms += list(extra(self.fields, self.disc.connectors))
-        self.finish(terms, supports)
-
-    def build(self, net: Net, stiffness: Array, mass: Array, comm: MPI.Comm) -> None:
-        """Fields and constants."""
         self.net, self.comm = net, comm
         self.disc = Discretisation(net, stiffness, mass, comm)
         self.fields = self.disc.tows
+        self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
+        self._full_gravity, self._load = np.array(gravity), load
+        self._constants(mass_scale)
+        self.histories = Histories(self.disc)
+        self.histories.add("strain", "cells", self.fields.strain_n, beam.strain(self.fields))
+
+        terms = self._tow_terms()
+        self.crossings: Crossings | None = None
+        if len(net.crossings):
+            if crossovers is None:
+                raise ValueError("a net with crossings needs a law for them")
+            self.crossings = Crossings(self.disc, crossovers, self.histories)
+            terms += self.crossings.terms
+        self.contacts: Contacts | None = None
+        if self.tools:
+            if contact_law is None:
+                raise ValueError("tools need a contact law")
+            self.contacts = Contacts(self.disc, self.tools, contact_law, self.histories)
+            terms += self.contacts.terms
+        if extra is not None:
+            terms += list(extra(self.fields, self.disc.connectors))
+        self.system = System(self.disc, terms, law=self.law)
+        self._number(supports)
+
+    def _constants(self, mass_scale: float) -> None:
         mesh = self.fields.mesh
         self.c_0, self.c_1 = _dolfinx.constant(mesh, 0.0), _dolfinx.constant(mesh, 0.0)
-        self.mass_scale = _dolfinx.constant(mesh, 1.0)
-        self.gravity = _dolfinx.constant(mesh, (0.0, 0.0, 0.0))
+        self.mass_scale = _dolfinx.constant(mesh, mass_scale)
+        self.gravity = _dolfinx.constant(mesh, tuple(self._full_gravity))
         self.relaxation = _dolfinx.constant(mesh, 0.0)
         self.law = beam.viscous_section(self.relaxation)
 
@@ -160,82 +136,13 @@ class Model:
                 beam.strain_energy(tows),
             )
         ]
-        if np.any(self.full_gravity):
+        if np.any(self._full_gravity):
             terms.append(Term("weight", "tows", inertia.weight(tows, self.gravity), None))
         if self.alpha is not None:
             work = inertia.inertia(tows, self.c_0, self.c_1, self.mass_scale)
             kinetic = inertia.kinetic_energy(tows, self.c_1, self.mass_scale)
             terms.append(work_term("inertia", tows, work, energy=kinetic))
         return terms
-
-    def _crossover_terms(self, law: CrossoverLaw) -> list[Term]:
-        names = ("translation springs", "normal alignment", "rotational spring", "dashpot")
-        fields = self.disc.connectors
-        if fields is None:
-            return [Term(name, "crossovers", None, None) for name in names]
-
-        def number(value: float) -> Any:
-            return _dolfinx.constant(fields.mesh, value)
-
-        self.per_time = number(0.0)
-        k1, k3, beta = number(law.k1), number(law.k3), number(law.dashpot)
-        space = _dolfinx.constants_per_cell(fields.mesh, 1)
-        self.gamma_n = Function(space)
-
-        def spring(gamma: Any) -> Any:
-            return crossover.spring_moment(gamma, k1, k3)
-
-        def dashpot(gamma: Any) -> Any:
-            return crossover.dashpot_moment(gamma, beta, self.gamma_n, self.per_time)
-
-        gamma = crossover.shear_angle(fields, fields.w)
-        self._gamma_form = crossover.crossing_values(fields, gamma, space)
-        self._moment_form = crossover.crossing_values(fields, spring(gamma) + dashpot(gamma), space)
-        opening = crossover.opening_energy(fields, number(law.translation))
-        alignment = crossover.alignment_energy(fields, number(law.alignment))
-        return [
-            energy_term(names[0], fields, opening),
-            energy_term(names[1], fields, alignment),
-            work_term(
-                names[2],
-                fields,
-                crossover.turning_work(fields, spring),
-                energy=crossover.rotational_energy(fields, k1, k3),
-            ),
-            work_term(names[3], fields, crossover.turning_work(fields, dashpot)),
-        ]
-
-    def _contact_term(self, tool: Tool) -> Term:
-        law = self.contact_law
-        if law is None:
-            raise ValueError("tools need a contact law")
-        mesh = self.fields.mesh
-        place = _dolfinx.constant(mesh, tuple(tool.path(0.0)))
-        numbers = {key: _dolfinx.constant(mesh, value) for key, value in tool.numbers().items()}
-        stiffness = _dolfinx.constant(mesh, law.stiffness)
-        layer = _dolfinx.constant(mesh, law.layer)
-        self._places = [*getattr(self, "_places", []), place]
-        energy = contact.contact_energy(
-            self.fields, lambda x: tool.distance(x, place, numbers), stiffness, layer
-        )
-        return energy_term(tool.name, self.fields, energy)
-
-    def finish(self, terms: Sequence[Term], supports: Sequence[Support]) -> None:
-        """Compile the terms and number the supports."""
-        disc, comm = self.disc, self.comm
-        self.system = System(disc, terms, law=self.law)
-        tows = self.fields
-        self._strain = _dolfinx.compile_form(
-            beam.cell_values(tows, beam.strain(tows), disc.forces_space), comm
-        )
-        self._gamma = self._moment = None
-        if len(self.net.crossings):
-            here = disc.connectors is not None
-            self._gamma = _dolfinx.compile_form(self._gamma_form if here else None, comm, here=here)
-            self._moment = _dolfinx.compile_form(
-                self._moment_form if here else None, comm, here=here
-            )
-        self._number(supports)
 
     def _number(self, supports: Sequence[Support]) -> None:
         disc = self.disc
@@ -276,49 +183,41 @@ class Model:
 
     def set_time(self, start: float, end: float) -> None:
         """Move the tools to their places at the end of the step and set what depends on Δt."""
-        for tool, place in zip(self.tools, getattr(self, "_places", []), strict=True):
-            place.value[:] = tool.path(end)
-        self.gravity.value[:] = self.load(end) * self.full_gravity
+        self.gravity.value[:] = self._load(end) * self._full_gravity
         self.relaxation.value = self.viscosity / (end - start)
-        if self.disc.connectors is not None:
-            self.per_time.value = 1.0 / (end - start)
+        if self.crossings is not None:
+            self.crossings.set_step(end - start)
+        if self.contacts is not None:
+            self.contacts.set_time(start, end)
 
     def set_rates(self, c_0: float, c_1: float) -> None:
         """Constants of the time integration for this step."""
         self.c_0.value, self.c_1.value = c_0, c_1
 
     def remember(self) -> None:
-        """Update history: what the next step's dashpots start from. Called with w still set."""
-        strain_n = self.fields.strain_n.x.array
-        strain_n[:] = 0.0
-        _dolfinx.add_vector(strain_n, self._strain)
-        if self.disc.connectors is not None:
-            self.gamma_n.x.array[:] = self._at_crossings(self._gamma)
+        """Update what the next step starts from, with the increment still in the fields."""
+        self.histories.update()
 
     # What a reader asks for ---------------------------------------------------------------
 
-    def _at_crossings(self, form: Any) -> Array:
-        values = np.zeros_like(self.gamma_n.x.array)
-        _dolfinx.add_vector(values, form)
-        return values
-
-    def _gather_crossings(self, form: Any) -> Array:
-        disc = self.disc
-        local = np.zeros((0, 1))
-        if disc.connectors is not None:
-            field = Function(self.gamma_n.function_space)
-            field.x.array[:] = self._at_crossings(form)
-            local = disc.crossing_values(field)
-        return disc.gather_crossings(local)[:, 0]
-
     def shear_angles(self) -> Array:
         """Shear angle γ at each crossing of the net [rad], on every rank."""
-        return self._gather_crossings(self._gamma)
+        return np.zeros(0) if self.crossings is None else self.crossings.angles()
 
     def tool_forces(self) -> dict[str, Array]:
         """Force that each tool exerts on the fabric at the last increment [N], shape (3,) each."""
-        own = {t.name: -self.system.term_forces(t.name)[:, :3].sum(axis=0) for t in self.tools}
-        return {name: self.comm.allreduce(force) for name, force in own.items()}
+        forces = {}
+        for tool in self.tools:
+            own = -self._on_nodes(tool).sum(axis=0)
+            forces[tool.name] = self.comm.allreduce(own)
+        return forces
+
+    def _on_nodes(self, tool: Tool) -> Array:
+        """Pressure and friction of a tool on this rank's own nodes, reversed, (n_owned, 3) [N]."""
+        force = self.system.term_forces(tool.name)[:, :3]
+        if self.contacts is not None and self.contacts.frictional:
+            force = force + self.system.term_forces(f"{tool.name} friction")[:, :3]
+        return force
 
     def reactions(self) -> Array:
         """Force and moment that supports exert on each node [N, N mm], (n_nodes, 6), every rank."""
@@ -342,8 +241,6 @@ class Model:
         for tool in self.tools:
             force = self.system.term_forces(tool.name)[:, :3]
             pressure[:, 0] += np.linalg.norm(force, axis=1)
-        crossings = len(net.crossings) > 0
-        empty = np.zeros(0)
         return Snapshot(
             time=time,
             displacement=disc.gather_nodes(u[: disc.owned]),
@@ -351,8 +248,8 @@ class Model:
             section_forces=forces[:, :3],
             section_moments=forces[:, 3:],
             contact_pressure=disc.gather_nodes(pressure)[:, 0] / net.node_lengths,
-            shear_angle=self._gather_crossings(self._gamma) if crossings else empty,
-            crossing_moment=self._gather_crossings(self._moment) if crossings else empty,
+            shear_angle=self.shear_angles(),
+            crossing_moment=np.zeros(0) if self.crossings is None else self.crossings.moments(),
         )
 
     def _reference_directors(self) -> tuple[Array, Array, Array]:

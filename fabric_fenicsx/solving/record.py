@@ -23,7 +23,7 @@ from ..output.snapshot import Snapshot
 from .model import Model
 from .stepping import Step, Stepper
 
-__all__ = ["Record", "load_state", "prepare_folder"]
+__all__ = ["Record", "load_state", "prepare_folder", "write_result"]
 
 
 def prepare_folder(folder: Path, comm: Any) -> None:
@@ -115,6 +115,7 @@ class Record:
             "previous": state.previous,
         }
         whole = {name: disc.gather_nodes(values[:n]) for name, values in arrays.items()}
+        histories = self.model.histories.save()
         if self._root:
             with _replacing(self.steps / f"step_{step.number:05d}.npz") as path:
                 with path.open("wb") as file:
@@ -125,13 +126,14 @@ class Record:
                         previous_step=state.previous_step,
                         next_step=state.next_step,
                         **whole,
+                        **{f"history: {k}": v for k, v in histories.items()},
                     )
 
-    def finish(self, result: dict[str, Any]) -> None:
-        """Write result.json."""
-        if self._root:
-            with _replacing(self.folder / "result.json") as path:
-                path.write_text(json.dumps(result, indent=2) + "\n")
+
+def write_result(folder: Path, result: dict[str, Any]) -> None:
+    """Write result.json; one rank calls it."""
+    with _replacing(folder / "result.json") as path:
+        path.write_text(json.dumps(result, indent=2) + "\n")
 
 
 def load_state(path: Path, stepper: Stepper) -> None:
@@ -164,7 +166,12 @@ def load_state(path: Path, stepper: Stepper) -> None:
     state.previous_step = float(data["previous_step"])
     state.next_step = float(data["next_step"])
     stepper.number = int(data["number"])
-    stepper.model.remember()
+    prefix = "history: "
+    saved = {k.removeprefix(prefix): v for k, v in data.items() if k.startswith(prefix)}
+    try:
+        stepper.model.histories.load(saved)
+    except KeyError as error:
+        raise InputError(f"{path}: has no history {error}, which this case needs") from None
 
 
 class _replacing:

@@ -55,11 +55,14 @@ class System:
             residual = _dolfinx.compile_form(term.residual, comm, here=own)
             self._residuals[term.where].append(residual)
             self._term_residuals[term.name] = residual
-            if term.tangent is not None:
+            # A rank without crossings has no forms of them, but must wait for those that have.
+            some = comm.allgather((term.tangent is not None, term.energy is not None))
+            has_tangent, has_energy = (any(flags) for flags in zip(*some, strict=True))
+            if has_tangent:
                 self._tangents[term.where].append(
                     _dolfinx.compile_form(term.tangent, comm, here=own)
                 )
-            if term.energy is not None:
+            if has_energy:
                 self._energies[term.name] = _dolfinx.compile_form(term.energy, comm, here=own)
         tows = net.tows
         self._dw = Function(tows.space)

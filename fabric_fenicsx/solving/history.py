@@ -1,0 +1,116 @@
+"""What a model remembers from step to step: fields updated when a step is accepted.
+
+A history is a field and an expression for its next value, evaluated with the increment of the step
+still in the unknowns. All expressions are evaluated before any field changes.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import _dolfinx
+from ..mechanics import beam, crossover
+from .discretisation import Discretisation
+
+__all__ = ["Histories"]
+
+Array = npt.NDArray[np.float64]
+Where = Literal["cells", "nodes", "crossings"]
+
+
+class Histories:
+    """The remembered fields of a model, by name.
+
+    Args:
+        disc: the discretised net.
+    """
+
+    def __init__(self, disc: Discretisation) -> None:
+        self.disc = disc
+        self._entries: dict[str, tuple[Where, Any, Any]] = {}
+        self._node_length: Array | None = None
+
+    def add(self, name: str, where: Where, field: Any, expression: Any) -> None:
+        """Remember ``expression`` in ``field``. Collective; compiles.
+
+        Args:
+            name: unique; names the array in step files.
+            where: constant per "cells" or "crossings", or at the "nodes".
+            field: the function that holds it; None on a rank without crossings.
+            expression: its next value (UFL).
+        """
+        disc = self.disc
+        form = None
+        if field is not None:
+            space = field.function_space
+            if where == "cells":
+                form = beam.cell_values(disc.tows, expression, space)
+            elif where == "nodes":
+                form = beam.node_sums(disc.tows, expression, space)
+            elif disc.connectors is not None:
+                form = crossover.crossing_values(disc.connectors, expression, space)
+        here = field is not None
+        self._entries[name] = (
+            where,
+            field,
+            _dolfinx.compile_form(form, disc.comm, here=here),
+        )
+
+    def update(self) -> None:
+        """Evaluate every expression, then change the fields."""
+        new = []
+        for where, field, form in self._entries.values():
+            if field is None:
+                continue
+            values = np.zeros_like(field.x.array)
+            _dolfinx.add_vector(values, form)
+            if where == "nodes":
+                weights = np.repeat(self._lengths(), 3)
+                np.divide(values, weights, out=values, where=weights > 0.0)
+            new.append((field, values))
+        for field, values in new:
+            field.x.array[:] = values
+            field.x.scatter_forward()
+
+    def save(self) -> dict[str, Array]:
+        """The remembered values in the order of the net, on every rank. Collective."""
+        disc = self.disc
+        saved = {}
+        for name, (where, field, _) in self._entries.items():
+            if where == "nodes":
+                saved[name] = disc.gather_nodes(field.x.array.reshape(-1, 3)[: disc.owned])
+            elif where == "cells":
+                saved[name] = disc.gather_cells(disc.cell_values(field))
+            else:
+                own = np.zeros((0, 1)) if field is None else disc.crossing_values(field)
+                saved[name] = disc.gather_crossings(own)
+        return saved
+
+    def load(self, saved: dict[str, Array]) -> None:
+        """Put saved values back; KeyError where one is missing."""
+        disc = self.disc
+        for name, (where, field, _) in self._entries.items():
+            values = saved[name]
+            if field is None:
+                continue
+            if where == "nodes":
+                field.x.array[:] = values[disc.local_nodes].ravel()
+            elif where == "cells":
+                field.x.array[:] = disc.cell_field(field.function_space, values).x.array
+            else:
+                field.x.array[:] = disc.crossing_field(field.function_space, values).x.array
+
+    def _lengths(self) -> Array:
+        """Tow length of the owned cells at each local node [mm]."""
+        if self._node_length is None:
+            disc = self.disc
+            local = np.zeros(len(disc.local_nodes))
+            count = len(disc.owned_cells)
+            blocks = _dolfinx.cell_dofs(disc.tows.space)[:count]
+            half = disc.net.lengths[disc.owned_cells] / 2.0
+            np.add.at(local, blocks.ravel(), np.repeat(half, 2))
+            self._node_length = local
+        return self._node_length

@@ -1,0 +1,218 @@
+"""Crossings and contact of a model: from their laws to terms, constants and histories."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx.fem import Function
+
+from .. import _dolfinx
+from ..mechanics import contact, crossover
+from ..mechanics.shear_laws import Crossing, LinearDashpot, PolynomialSpring, ShearLaw
+from ..mechanics.terms import Term, energy_term, work_term
+from ..mechanics.tools import Tool
+from .discretisation import Discretisation
+from .history import Histories
+
+__all__ = ["ContactLaw", "Contacts", "Crossings", "CrossoverLaw"]
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class CrossoverLaw:
+    """What joins warp and weft at every crossing.
+
+    Attributes:
+        translation: k of the three translational springs [N/mm].
+        k1, k3: in-plane spring M = k1 γ + k3 γ³ [N mm].
+        dashpot: β of M = β γ̇ [N mm s].
+        alignment: restoring moment of the sheet normals per sine of their tilt [N mm].
+        laws: further in-plane moments, see mechanics.shear_laws.
+    """
+
+    translation: float
+    k1: float
+    k3: float
+    dashpot: float
+    alignment: float
+    laws: tuple[ShearLaw, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ContactLaw:
+    """Pressure and friction between tows and tools, see mechanics.contact.
+
+    Attributes:
+        stiffness: force per tow length and penetration [N/mm²].
+        layer: penetration over which the stiffness builds up [mm].
+        friction: Coulomb's μ [-]; 0 leaves friction out.
+        stick_stiffness: friction force per tow length and stretch of the stick [N/mm²].
+    """
+
+    stiffness: float
+    layer: float
+    friction: float = 0.0
+    stick_stiffness: float = 0.5
+
+
+class Crossings:
+    """Terms of the crossings, and the angles and moments there.
+
+    Args:
+        disc: the discretised net; it has crossings.
+        law: what joins the tows.
+        histories: where the laws' memories go.
+    """
+
+    def __init__(self, disc: Discretisation, law: CrossoverLaw, histories: Histories) -> None:
+        self.disc = disc
+        turning: tuple[ShearLaw, ...] = (
+            PolynomialSpring({1: law.k1, 3: law.k3}, "rotational spring"),
+            LinearDashpot(law.dashpot, "dashpot"),
+            *law.laws,
+        )
+        fields = disc.connectors
+        if fields is None:
+            self._without_crossings(turning, histories)
+            return
+
+        def number(value: Any) -> Any:
+            return _dolfinx.constant(fields.mesh, value)
+
+        self._space = _dolfinx.constants_per_cell(fields.mesh, 1)
+        self.per_time = number(1.0)
+        gamma = crossover.shear_angle(fields, fields.w)
+        gamma_n = Function(self._space)
+        self.terms = [
+            energy_term(
+                "translation springs",
+                fields,
+                crossover.opening_energy(fields, number(law.translation)),
+            ),
+            energy_term(
+                "normal alignment",
+                fields,
+                crossover.alignment_energy(fields, number(law.alignment)),
+            ),
+        ]
+        moments = []
+        for piece in turning:
+            memory: dict[str, Function] = {}
+
+            def past(name: str, memory: dict[str, Function] = memory) -> Function:
+                return memory.setdefault(name, Function(self._space))
+
+            at = Crossing(gamma, gamma_n, self.per_time, number, past)
+            moment = piece.moment(at)
+            moments.append(moment)
+            energy = None
+            if piece is turning[0]:
+                energy = crossover.rotational_energy(fields, number(law.k1), number(law.k3))
+            work = crossover.turning_work(fields, moment, gamma)
+            self.terms.append(work_term(piece.name, fields, work, energy=energy))
+            for name, value in piece.history(at).items():
+                histories.add(f"{piece.name}: {name}", "crossings", past(name), value)
+        histories.add("shear angle", "crossings", gamma_n, gamma)
+        self._angle = self._compiled(gamma)
+        self._moment = self._compiled(sum(moments))
+
+    def _without_crossings(self, turning: Sequence[ShearLaw], histories: Histories) -> None:
+        """The same collective calls on a rank that has no crossing of its own."""
+        names = ["translation springs", "normal alignment", *(piece.name for piece in turning)]
+        self.terms = [Term(name, "crossovers", None, None) for name in names]
+        zero = Crossing(0.0, 0.0, 1.0, lambda value: value, lambda name: 0.0)
+        for piece in turning:
+            for name in piece.history(zero):
+                histories.add(f"{piece.name}: {name}", "crossings", None, None)
+        histories.add("shear angle", "crossings", None, None)
+        self._angle = self._compiled(None)
+        self._moment = self._compiled(None)
+
+    def _compiled(self, expression: Any) -> Any:
+        fields, comm = self.disc.connectors, self.disc.comm
+        if fields is None:
+            return _dolfinx.compile_form(None, comm, here=False)
+        return _dolfinx.compile_form(
+            crossover.crossing_values(fields, expression, self._space), comm
+        )
+
+    def set_step(self, length: float) -> None:
+        """Δt [s] of the step to come."""
+        if self.disc.connectors is not None:
+            self.per_time.value = 1.0 / length
+
+    def angles(self) -> Array:
+        """Shear angle γ at each crossing of the net [rad], on every rank. Collective."""
+        return self._gathered(self._angle)
+
+    def moments(self) -> Array:
+        """Moment between the tows of each crossing [N mm], on every rank. Collective."""
+        return self._gathered(self._moment)
+
+    def _gathered(self, form: Any) -> Array:
+        own = np.zeros((0, 1))
+        if form is not None:
+            field = Function(self._space)
+            _dolfinx.add_vector(field.x.array, form)
+            own = self.disc.crossing_values(field)
+        return self.disc.gather_crossings(own)[:, 0]
+
+
+class Contacts:
+    """Terms of the contact with tools, and the tools' motion.
+
+    Args:
+        disc: the discretised net.
+        tools: what the fabric touches.
+        law: how it touches.
+        histories: where the friction's memory goes.
+    """
+
+    def __init__(
+        self, disc: Discretisation, tools: Sequence[Tool], law: ContactLaw, histories: Histories
+    ) -> None:
+        self.tools = list(tools)
+        self.terms: list[Term] = []
+        self.frictional = law.friction > 0.0
+        self._places: list[Any] = []
+        self._shifts: list[Any] = []
+        tows = disc.tows
+
+        def number(value: Any) -> Any:
+            return _dolfinx.constant(tows.mesh, value)
+
+        pressure = (number(law.stiffness), number(law.layer))
+        friction = (number(law.friction), number(law.stick_stiffness))
+        for tool in self.tools:
+            place = number(tuple(tool.path(0.0)))
+            shift = number((0.0, 0.0, 0.0))
+            numbers = {key: number(value) for key, value in tool.numbers().items()}
+            self._places.append(place)
+            self._shifts.append(shift)
+
+            def distance(
+                x: Any, tool: Tool = tool, place: Any = place, numbers: dict[str, Any] = numbers
+            ) -> Any:
+                return tool.distance(x, place, numbers)
+
+            energy = contact.contact_energy(tows, distance, *pressure)
+            self.terms.append(energy_term(tool.name, tows, energy))
+            if self.frictional:
+                traction_n = Function(tows.u_n.function_space)
+                traction = contact.friction_traction(
+                    tows, distance, pressure, friction, traction_n, shift
+                )
+                work = contact.traction_work(tows, traction)
+                self.terms.append(work_term(f"{tool.name} friction", tows, work))
+                histories.add(f"{tool.name}: traction", "nodes", traction_n, traction)
+
+    def set_time(self, start: float, end: float) -> None:
+        """Move the tools to their places at the end of the step."""
+        for tool, place, shift in zip(self.tools, self._places, self._shifts, strict=True):
+            place.value[:] = tool.path(end)
+            shift.value[:] = np.subtract(tool.path(end), tool.path(start))
