@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fabric_fenicsx.fabric.chains import net_from_lines
 from fabric_fenicsx.solving.model import Model
 from fabric_fenicsx.solving.stepping import StepControl, Stepper
 
@@ -101,3 +102,30 @@ def orders(errors, factor: float = 2.0):
     """Observed orders of convergence of errors on meshes (or steps) finer by a factor each."""
     errors = np.asarray(errors)
     return np.log(errors[:-1] / errors[1:]) / np.log(factor)
+
+
+def plain_net(n_warp: int, n_weft: int, spacing: float, subdivisions: int):
+    """A flat net: warp tows along y at x = s, 2s, ..., weft tows along x, a bay beyond the last."""
+    lines, points = {0: [], 1: []}, []
+    for family, count, across in ((0, n_warp, n_weft), (1, n_weft, n_warp)):
+        along = np.linspace(0.0, (across + 1) * spacing, (across + 1) * subdivisions + 1)
+        for k in range(count):
+            first = sum(map(len, points))
+            fixed = np.full(len(along), (k + 1) * spacing)
+            xy = (fixed, along) if family == 0 else (along, fixed)
+            points.append(np.column_stack([*xy, 0.0 * along]))
+            nodes = first + np.arange(len(along))
+            lines[family].append(np.column_stack([nodes[:-1], nodes[1:]]))
+    return net_from_lines(np.vstack(points), np.vstack(lines[0]), np.vstack(lines[1]))[0]
+
+
+def set_state(model: Model, u, q) -> None:
+    """Make displacements (n_nodes, 3) and quaternions (n_nodes, 4) the accepted state."""
+    disc = model.disc
+    places = [(disc.tows, disc.local_nodes)]
+    if disc.connectors is not None:
+        places.append((disc.connectors, disc.connector_nodes))
+    for fields, nodes in places:
+        fields.u_n.x.array[:] = u[nodes].ravel()
+        fields.q_n.x.array[:] = q[nodes].ravel()
+        fields.w.x.array[:] = 0.0

@@ -1,0 +1,76 @@
+"""A small net on however many ranks run this: norms, forces and a solved state as JSON on rank 0.
+
+The state that the tangent is assembled at is given per node of the net, so that nothing depends on
+how the net is distributed. Run by test_crossover under mpirun, and imported by it.
+"""
+
+import json
+
+from mpi4py import MPI
+
+import numpy as np
+from solve import GivenSection, Statics, plain_net, set_loads, set_state
+
+from fabric_fenicsx.solving.model import CrossoverLaw, Model, Support
+
+SECTION = GivenSection((400.0, 150.0, 150.0, 60.0, 50.0, 90.0))
+LAW = CrossoverLaw(translation=40.0, k1=5.0, k3=2.0, dashpot=3.0, alignment=8.0)
+
+
+def small_model(comm):
+    """A net of 3 x 4 tows, clamped at the warps' feet."""
+    net = plain_net(3, 4, 4.0, 2)
+    feet = net.ends[net.tow_family == 0, 0]
+    supports = [Support(feet, (0, 1, 2, 3, 4, 5))]
+    return Model(net, SECTION, crossovers=LAW, supports=supports, comm=comm)
+
+
+def tangent_norm(comm, *, crossings=True):
+    """Frobenius norm of the tangent at a bent state, and the norm of the residual there."""
+    model = small_model(comm)
+    disc, system = model.disc, model.system
+    rng = np.random.default_rng(5)
+    n = len(model.net.points)
+    u, q, w = rng.normal(size=(n, 3)), np.ones((n, 4)), 0.1 * rng.normal(size=(n, 6))
+    q[:, 1:] = 0.2 * rng.normal(size=(n, 3))
+    set_state(model, 0.3 * u, q / np.linalg.norm(q, axis=1)[:, None])
+    model.set_time(0.0, 0.5)
+    x, F = disc.vector(), disc.vector()
+    x.array[:] = w[disc.local_nodes[: disc.owned]].ravel()
+    # Twice: about x itself, so that the section forces are the current ones.
+    for _ in range(2):
+        system.set_increment(x, linearise_from="last")
+    A = disc.matrix(crossings=crossings)
+    system.tangent(A)
+    system.residual(F)
+    return A.norm(), F.norm()
+
+
+def solved(comm):
+    """Displacements and shear angles of the net under two corner forces."""
+    model = small_model(comm)
+    statics = Statics(model, force_tolerance=1e-10)
+    top = model.net.ends[model.net.tow_family == 0, 1]
+
+    def load(part):
+        for node, force in ((top[0], [0.1, 0.0, 0.3]), (top[-1], [0.2, 0.1, -0.4])):
+            set_loads(model, node, part * np.array([*force, 0.0, 0.0, 0.0]))
+
+    statics.run(3, load)
+    model.system.set_increment(model.disc.vector())
+    return statics.displacements, model.shear_angles()
+
+
+if __name__ == "__main__":
+    world = MPI.COMM_WORLD
+    norm, residual = tangent_norm(world)
+    displacements, gamma = solved(world)
+    if world.rank == 0:
+        found = {
+            "ranks": world.size,
+            "tangent": norm,
+            "residual": residual,
+            "displacements": displacements.tolist(),
+            "gamma": gamma.tolist(),
+        }
+        print(json.dumps(found))
