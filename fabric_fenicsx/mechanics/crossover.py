@@ -30,15 +30,16 @@ __all__ = [
 
 
 def shear_angle(fields: ConnectorFields, w: Any) -> Any:
-    """In-plane angle γ [rad] by which warp and weft have turned towards each other from 90°.
+    """In-plane angle γ [rad] by which warp and weft have turned towards each other.
 
-    From the tows' directors about the mean normal, by atan2: smooth through 90 degrees.
+    From the tows' directors about the mean normal, by atan2: smooth through 90 degrees. It counts
+    from the angle before deformation, which is not 90 degrees in a braid.
     """
     q_warp, q_weft = fields.rotations(w)
     t_warp, t_weft = rotate(q_warp, fields.warp), rotate(q_weft, fields.weft)
     n = rotate(q_warp, fields.normal) + rotate(q_weft, fields.normal)
     n = n / sqrt(dot(n, n))
-    return atan2(dot(t_weft, t_warp), dot(n, cross(t_weft, t_warp)))
+    return atan2(dot(t_weft, t_warp), dot(n, cross(t_weft, t_warp))) - fields.angle_0
 
 
 def opening_energy(fields: ConnectorFields, k: Any) -> Any:
@@ -48,14 +49,14 @@ def opening_energy(fields: ConnectorFields, k: Any) -> Any:
 
 
 def turning_work(fields: ConnectorFields, moment: Any, gamma: Any) -> Any:
-    """Virtual work M δγ of an in-plane moment M(γ) at the crossings."""
-    return moment * derivative(gamma, fields.w, fields.test) * fields.point
+    """Virtual work M δγ of an in-plane moment M(γ) at the crossings, weighted by interlacing."""
+    return fields.interlacing * moment * derivative(gamma, fields.w, fields.test) * fields.point
 
 
 def rotational_energy(fields: ConnectorFields, k1: Any, k3: Any) -> Any:
     """Energy of the in-plane spring, k1 γ²/2 + k3 γ⁴/4 [N mm]."""
     gamma = shear_angle(fields, fields.w)
-    return (k1 * gamma**2 / 2 + k3 * gamma**4 / 4) * fields.point
+    return fields.interlacing * (k1 * gamma**2 / 2 + k3 * gamma**4 / 4) * fields.point
 
 
 def alignment_energy(fields: ConnectorFields, k: Any) -> Any:

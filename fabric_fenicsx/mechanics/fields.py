@@ -131,6 +131,8 @@ class ConnectorFields:
         w, u_n, q_n: as for the tows, at the two ends.
         warp, weft: unit tangents of the tows before deformation, per crossing.
         normal: the sheet's unit normal there.
+        angle_0: in-plane angle beyond 90° between the tows before deformation [rad]; 0 in a weave.
+        interlacing: share of the in-plane moments that acts at a crossing [-]; 1 in a plain weave.
     """
 
     mesh: Any
@@ -141,6 +143,8 @@ class ConnectorFields:
     warp: Any
     weft: Any
     normal: Any
+    angle_0: Any
+    interlacing: Any
 
     @property
     def test(self) -> Any:

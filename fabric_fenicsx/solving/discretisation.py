@@ -40,6 +40,7 @@ class Discretisation:
         stiffness: section stiffnesses per cell of the net, shape (n_cells, 6) [N, N mm²].
         mass: mass and three rotary inertias per cell, shape (n_cells, 4) [tonne/mm, tonne mm].
         comm: communicator of the run.
+        interlacing: share of the in-plane moments at each crossing; by default 1, (n_crossings,).
 
     Attributes:
         tows: fields on the tow mesh.
@@ -50,8 +51,16 @@ class Discretisation:
         local_crossings: crossings of the net that this rank assembles.
     """
 
-    def __init__(self, net: Net, stiffness: Array, mass: Array, comm: MPI.Comm) -> None:
+    def __init__(
+        self,
+        net: Net,
+        stiffness: Array,
+        mass: Array,
+        comm: MPI.Comm,
+        interlacing: Array | None = None,
+    ) -> None:
         self.net, self.comm = net, comm
+        self.interlacing = np.ones(len(net.crossings)) if interlacing is None else interlacing
         mesh = _dolfinx.interval_mesh(comm, net.points, net.cells)
         space = _dolfinx.lagrange(mesh, BLOCK)
         self._number(mesh, space)
@@ -134,6 +143,7 @@ class Discretisation:
         self.connector_rows = expand(self.connector_blocks)
 
         vectors = _dolfinx.constants_per_cell(mesh, 3)
+        numbers = _dolfinx.constants_per_cell(mesh, 1)
         directions = self._crossing_directions()
         return ConnectorFields(
             mesh=mesh,
@@ -144,6 +154,8 @@ class Discretisation:
             warp=self.crossing_field(vectors, directions["warp"]),
             weft=self.crossing_field(vectors, directions["weft"]),
             normal=self.crossing_field(vectors, directions["normal"]),
+            angle_0=self.crossing_field(numbers, reference_angle(**directions)),
+            interlacing=self.crossing_field(numbers, self.interlacing),
         )
 
     def nodal_directions(self) -> dict[str, Array]:
@@ -281,6 +293,13 @@ class Discretisation:
         update(self.tows)
         if self.connectors is not None:
             update(self.connectors)
+
+
+def reference_angle(warp: Array, weft: Array, normal: Array) -> Array:
+    """In-plane angle of undeformed crossings beyond 90° [rad], as mechanics.crossover counts it."""
+    cosine = np.einsum("ij,ij->i", weft, warp)
+    sine = np.einsum("ij,ij->i", normal, np.cross(weft, warp))
+    return np.arctan2(cosine, sine)
 
 
 def expand(blocks: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -64,6 +64,7 @@ class Model:
         tools: what the fabric touches.
         contact_law: how it touches.
         supports: prescribed motions.
+        interlacing: share of the in-plane moments at each crossing, (n_crossings,); by default 1.
         extra: further terms, from the fields of the tows and of the connectors (None on a rank
             without crossings); returns as many terms on every rank.
         comm: communicator.
@@ -83,6 +84,7 @@ class Model:
         tools: Sequence[Tool] = (),
         contact_law: ContactLaw | None = None,
         supports: Sequence[Support] = (),
+        interlacing: Array | None = None,
         extra: Callable[[TowFields, ConnectorFields | None], Sequence[Term]] | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
@@ -91,7 +93,7 @@ class Model:
         stiffness = np.array([s.stiffness() for s in pair])[family]
         mass = np.array([s.mass() for s in pair])[family]
         self.net, self.comm = net, comm
-        self.disc = Discretisation(net, stiffness, mass, comm)
+        self.disc = Discretisation(net, stiffness, mass, comm, interlacing)
         self.fields = self.disc.tows
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
         self._full_gravity, self._load = np.array(gravity), load

@@ -119,7 +119,7 @@ class Crossings:
                 histories.add(f"{piece.name}: {name}", "crossings", past(name), value)
         histories.add("shear angle", "crossings", gamma_n, gamma)
         self._angle = self._compiled(gamma)
-        self._moment = self._compiled(sum(moments))
+        self._moment = self._compiled(fields.interlacing * sum(moments))
 
     def _without_crossings(self, turning: Sequence[ShearLaw], histories: Histories) -> None:
         """The same collective calls on a rank that has no crossing of its own."""
