@@ -1,0 +1,43 @@
+"""Entry point of `fabric-fenicsx` and of `python -m fabric_fenicsx`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+__all__ = ["main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit: 0, 1 for a solve that stopped, 2 for bad input."""
+    # Parallelism is MPI's; threads of BLAS on top of it only get in each other's way.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    if not os.environ.get("DISPLAY"):
+        # VTK tries an X server first and complains when there is none.
+        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+
+    from .cli import app
+    from .errors import InputError
+    from .parallel import rank
+
+    if rank() != 0:
+        sys.stdout = open(os.devnull, "w")
+    try:
+        code = app(list(arguments) if arguments is not None else None, standalone_mode=False)
+    except KeyboardInterrupt:
+        code = 130
+    except Exception as error:
+        # Typer's own errors have no common public class; this is what they have in common.
+        if not hasattr(error, "format_message"):
+            raise
+        message = " ".join(error.format_message().split())
+        if rank() == 0 and message:
+            print(f"{message} (fabric-fenicsx --help lists what is allowed)", file=sys.stderr)
+        code = InputError.exit_code
+    sys.stdout.flush()
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,143 @@
+"""What a run says while it goes on and when it has ended. Rank 0 only; needs no dolfinx."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from .rigs.keys import unit
+
+__all__ = ["following", "summarise"]
+
+COMPILING = "compiling forms, about a minute on a first run"
+
+HEADINGS = {
+    "x_mm": "x [mm]",
+    "y_mm": "y [mm]",
+    "measured_deg": "measured [°]",
+    "std_deg": "± [°]",
+    "paper_deg": "paper [°]",
+    "angle_deg": "this run [°]",
+}
+
+
+class Following:
+    """Tells of steps on stderr: a bar on a terminal, else only of a first compilation."""
+
+    def __init__(self, bar: Progress | None) -> None:
+        self._bar = bar
+        self._task = bar.add_task("preparing", total=1.0, steps="") if bar else None
+        self._begun = threading.Event()
+
+    def __call__(self, fraction: float, steps: int, iterations: int) -> None:
+        """Progress of the run: fraction done, accepted steps, iterations of the last one."""
+        self._begun.set()
+        if self._bar is not None and self._task is not None:
+            self._bar.update(
+                self._task, completed=fraction, description="running", steps=f"{steps} steps"
+            )
+
+    def end(self) -> None:
+        """Stop to watch."""
+        self._begun.set()
+
+    def watch_compilation(self) -> None:
+        """Say so once if forms are compiled and not just read from the cache."""
+        while not self._begun.wait(0.5):
+            module = sys.modules.get("fabric_fenicsx._dolfinx")
+            spent = getattr(module, "compile_seconds", [0.0])
+            if spent[0] > 2.0:
+                if self._bar is not None and self._task is not None:
+                    self._bar.update(self._task, description=COMPILING)
+                else:
+                    print(COMPILING, file=sys.stderr, flush=True)
+                return
+
+
+@contextmanager
+def following(quiet: bool) -> Iterator[Any]:
+    """A function (fraction, steps, iterations) that shows progress, or does not when quiet."""
+    if quiet:
+        yield lambda fraction, steps, iterations: None
+        return
+    console = Console(stderr=True)
+    bar = None
+    if console.is_terminal:
+        bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[steps]}"),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+        )
+        bar.start()
+    watcher = Following(bar)
+    threading.Thread(target=watcher.watch_compilation, daemon=True).start()
+    try:
+        yield watcher
+    finally:
+        watcher.end()
+        if bar is not None:
+            bar.stop()
+
+
+def summarise(result: dict[str, Any], folder: Any) -> None:
+    """Print the quantities of a result, and lists of them as tables of their own."""
+    console = Console(highlight=False)
+    seconds = result["seconds"]["total"]
+    console.print(
+        f"{result['test']}: {result['steps']} steps, {result['newton_iterations']} iterations, "
+        f"{seconds:.1f} s; results in {folder}",
+        soft_wrap=True,
+    )
+    quantities: dict[str, Any] = result.get("quantities", {})
+    table = Table("quantity", "value", "unit")
+    for name, value in quantities.items():
+        if isinstance(value, (int, float, str)):
+            label = unit(name)
+            table.add_row(name.removesuffix(_ending(name)).replace("_", " "), _shown(value), label)
+    if table.row_count:
+        console.print(table)
+    for name, value in quantities.items():
+        if isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
+            console.print(_rows(name, value))
+
+
+def _rows(name: str, rows: list[dict[str, Any]]) -> Table:
+    columns = [
+        key
+        for key in dict.fromkeys(key for row in rows for key in row)
+        if all(not isinstance(row.get(key), (list, dict)) for row in rows)
+    ]
+    titles = [HEADINGS.get(key) or _heading(key) for key in columns]
+    table = Table(*titles, title=name, title_justify="left")
+    for row in rows:
+        table.add_row(*(_shown(row.get(key)) for key in columns))
+    return table
+
+
+def _heading(key: str) -> str:
+    words = key.removesuffix(_ending(key)).replace("_", " ")
+    return f"{words} \\[{unit(key)}]" if unit(key) else words
+
+
+def _ending(name: str) -> str:
+    """The part of a name that is its unit."""
+    from .rigs.keys import UNITS
+
+    return next(("_" + end for end in UNITS if name.endswith("_" + end)), "")
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
