@@ -178,8 +178,15 @@ def add_vector(array: npt.NDArray[np.float64], form: Any) -> None:
 
 
 def add_matrix(matrix: PETSc.Mat, form: Any) -> None:
-    """Add a bilinear form to a matrix through the matrix's local-to-global maps."""
-    fem.petsc.assemble_matrix(matrix, form)
+    """Add a bilinear form to a matrix through the matrix's local-to-global maps.
+
+    Collective over the matrix, although the form may live on this rank alone: dolfinx flushes the
+    matrix after each form. A rank that has no cells of it gives None and takes part in that.
+    """
+    if form is None:
+        matrix.assemble(PETSc.Mat.AssemblyType.FLUSH)
+    else:
+        fem.petsc.assemble_matrix(matrix, form)
 
 
 def cell_scalar(form: Any) -> float:
