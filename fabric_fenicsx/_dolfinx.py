@@ -26,6 +26,10 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
+# VTK has to be loaded before dolfinx: the other way round its colour bars crash in std::regex.
+import vtkmodules.vtkCommonCore  # noqa: F401
+
+# isort: split
 import basix
 import dolfinx
 import dolfinx.fem.petsc
@@ -180,13 +184,16 @@ def add_vector(array: npt.NDArray[np.float64], form: Any) -> None:
 def add_matrix(matrix: PETSc.Mat, form: Any) -> None:
     """Add a bilinear form to a matrix through the matrix's local-to-global maps.
 
-    Collective over the matrix, although the form may live on this rank alone: dolfinx flushes the
-    matrix after each form. A rank that has no cells of it gives None and takes part in that.
+    Not collective, unlike dolfinx's own wrapper, which flushes the matrix each time.
     """
-    if form is None:
-        matrix.assemble(PETSc.Mat.AssemblyType.FLUSH)
-    else:
-        fem.petsc.assemble_matrix(matrix, form)
+    kernel = getattr(form, "_cpp_object", form)
+    dolfinx.cpp.fem.petsc.assemble_matrix(
+        matrix,
+        kernel,
+        dolfinx.cpp.fem.pack_constants(kernel),
+        dolfinx.cpp.fem.pack_coefficients(kernel),
+        [],
+    )
 
 
 def cell_scalar(form: Any) -> float:

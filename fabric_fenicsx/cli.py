@@ -1,6 +1,6 @@
 """The command line. Nothing here imports dolfinx before a run begins: help must come at once.
 
-A further command is a function in a module of its own that `commands` names; it does its heavy
+A further command is a function in a module of its own, registered on `app`; it does its heavy
 imports inside, and what it does on several ranks inside `collective`.
 """
 

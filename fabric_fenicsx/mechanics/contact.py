@@ -22,6 +22,7 @@ __all__ = [
     "plate_with_hole",
     "pressure",
     "sphere",
+    "traction_loss",
     "traction_work",
 ]
 
@@ -84,6 +85,11 @@ def friction_traction(
 def traction_work(fields: TowFields, traction: Any) -> Any:
     """Virtual work ∫ t · δu ds of a traction that acts against the displacement."""
     return dot(traction, translation_part(fields.test)) * fields.nodes
+
+
+def traction_loss(fields: TowFields, traction: Any, shift: Any) -> Any:
+    """Energy t · (Δu − Δtool) that a traction takes over a step [N mm], the force at its end."""
+    return dot(traction, translation_part(fields.w) - shift) * fields.nodes
 
 
 def root(a: Any) -> Any:

@@ -25,6 +25,7 @@ __all__ = [
     "opening_energy",
     "rotational_energy",
     "shear_angle",
+    "turning_loss",
     "turning_work",
 ]
 
@@ -51,6 +52,11 @@ def opening_energy(fields: ConnectorFields, k: Any) -> Any:
 def turning_work(fields: ConnectorFields, moment: Any, gamma: Any) -> Any:
     """Virtual work M δγ of an in-plane moment M(γ) at the crossings, weighted by interlacing."""
     return fields.interlacing * moment * derivative(gamma, fields.w, fields.test) * fields.point
+
+
+def turning_loss(fields: ConnectorFields, moment: Any, change: Any) -> Any:
+    """Energy M Δγ that a moment takes over a step [N mm], with the moment at its end."""
+    return fields.interlacing * moment * change * fields.point
 
 
 def rotational_energy(fields: ConnectorFields, k1: Any, k3: Any) -> Any:

@@ -28,6 +28,8 @@ class Term:
         residual: virtual work R(w; v), a linear form.
         tangent: its derivative in w, a bilinear form (or what Newton shall use instead).
         energy: stored energy [N mm], if it has one.
+        loss: energy lost over the step [N mm], if it dissipates: force times change, the force
+            being that at the end of the step.
     """
 
     name: str
@@ -35,6 +37,7 @@ class Term:
     residual: Any
     tangent: Any
     energy: Any | None = None
+    loss: Any | None = None
 
 
 def energy_term(name: str, fields: TowFields | ConnectorFields, energy: Any) -> Term:
@@ -51,11 +54,12 @@ def work_term(
     residual: Any,
     tangent: Any | None = None,
     energy: Any | None = None,
+    loss: Any | None = None,
 ) -> Term:
     """An effect from its virtual work; the tangent is its derivative unless another is given."""
     if tangent is None:
         tangent = derivative(residual, fields.w, fields.trial)
-    return Term(name, _where(fields), residual, tangent, energy)
+    return Term(name, _where(fields), residual, tangent, energy, loss)
 
 
 def _where(fields: TowFields | ConnectorFields) -> Where:

@@ -101,6 +101,7 @@ class Crossings:
             ),
         ]
         moments = []
+        remembered: list[tuple[str, Any, Any]] = [("shear angle", gamma_n, gamma)]
         for piece in turning:
             memory: dict[str, Function] = {}
 
@@ -110,14 +111,16 @@ class Crossings:
             at = Crossing(gamma, gamma_n, self.per_time, number, past)
             moment = piece.moment(at)
             moments.append(moment)
-            energy = None
+            work = crossover.turning_work(fields, moment, gamma)
             if piece is turning[0]:
                 energy = crossover.rotational_energy(fields, number(law.k1), number(law.k3))
-            work = crossover.turning_work(fields, moment, gamma)
-            self.terms.append(work_term(piece.name, fields, work, energy=energy))
+                self.terms.append(work_term(piece.name, fields, work, energy=energy))
+            else:
+                loss = crossover.turning_loss(fields, moment, at.change)
+                self.terms.append(work_term(piece.name, fields, work, loss=loss))
             for name, value in piece.history(at).items():
-                histories.add(f"{piece.name}: {name}", "crossings", past(name), value)
-        histories.add("shear angle", "crossings", gamma_n, gamma)
+                remembered.append((f"{piece.name}: {name}", past(name), value))
+        self._remember(histories, remembered)
         self._angle = self._compiled(gamma)
         self._moment = self._compiled(fields.interlacing * sum(moments))
 
@@ -125,13 +128,16 @@ class Crossings:
         """The same collective calls on a rank that has no crossing of its own."""
         names = ["translation springs", "normal alignment", *(piece.name for piece in turning)]
         self.terms = [Term(name, "crossovers", None, None) for name in names]
-        zero = Crossing(0.0, 0.0, 1.0, lambda value: value, lambda name: 0.0)
-        for piece in turning:
-            for name in piece.history(zero):
-                histories.add(f"{piece.name}: {name}", "crossings", None, None)
-        histories.add("shear angle", "crossings", None, None)
+        self._remember(histories, [])
         self._angle = self._compiled(None)
         self._moment = self._compiled(None)
+
+    def _remember(self, histories: Histories, own: list[tuple[str, Any, Any]]) -> None:
+        """Hand over the memories; a rank without crossings learns their names from the others."""
+        parts = self.disc.comm.allgather([name for name, _, _ in own])
+        names = next(part for part in parts if part)
+        for name, field, expression in own or [(name, None, None) for name in names]:
+            histories.add(name, "crossings", field, expression)
 
     def _compiled(self, expression: Any) -> Any:
         fields, comm = self.disc.connectors, self.disc.comm
@@ -208,7 +214,8 @@ class Contacts:
                     tows, distance, pressure, friction, traction_n, shift
                 )
                 work = contact.traction_work(tows, traction)
-                self.terms.append(work_term(f"{tool.name} friction", tows, work))
+                loss = contact.traction_loss(tows, traction, shift)
+                self.terms.append(work_term(f"{tool.name} friction", tows, work, loss=loss))
                 histories.add(f"{tool.name}: traction", "nodes", traction_n, traction)
 
     def set_time(self, start: float, end: float) -> None:

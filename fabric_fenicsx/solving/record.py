@@ -20,6 +20,7 @@ import numpy.typing as npt
 from ..errors import InputError
 from ..output.paraview import TimeSeries
 from ..output.snapshot import Snapshot
+from .balance import Balance
 from .model import Model
 from .stepping import Step, Stepper
 
@@ -60,22 +61,27 @@ class Record:
         self.rows: list[dict[str, float]] = []
         self.steps = folder / "steps"
         self._root = model.comm.rank == 0
-        if not self._root:
-            return
+        if self._root:
+            self._open(resume_at)
+        past = model.comm.bcast(self.rows[-1] if self.rows else None)
+        self._balance = Balance(model, past)
+
+    def _open(self, resume_at: float | None) -> None:
+        """Start the series and the table, or cut both at the time to go on from."""
+        folder, net = self.folder, self.model.net
         self.steps.mkdir(exist_ok=True)
         table = folder / "steps.csv"
         if resume_at is None:
             for old in [*self.steps.glob("step_*.npz"), table, folder / "result.json"]:
                 old.unlink(missing_ok=True)
-            self._series = TimeSeries(folder / "paraview", model.net)
+            self._series = TimeSeries(folder / "paraview", net)
             return
-        self._series = TimeSeries(
-            folder / "paraview", model.net, resume=True, until=resume_at * (1.0 + 1e-12)
-        )
+        until = resume_at * (1.0 + 1e-12)
+        self._series = TimeSeries(folder / "paraview", net, resume=True, until=until)
         if table.exists():
             with table.open(newline="") as file:
                 rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
-            self.rows = [row for row in rows if row["time_s"] <= resume_at * (1.0 + 1e-12)]
+            self.rows = [row for row in rows if row["time_s"] <= until]
 
     def observe(self, step: Step, measure: Callable[[Snapshot], dict[str, float]]) -> Snapshot:
         """Write what is seen of a converged step: energies, tool forces, the ParaView files."""
@@ -88,10 +94,7 @@ class Record:
             "iterations": step.iterations,
             "failed_attempts": step.failures,
         }
-        energies = model.system.energies()
-        row |= {f"energy_{_key(k)}_N_mm": v for k, v in energies.items()}
-        for name, force in model.tool_forces().items():
-            row[f"{_key(name)}_force_z_N"] = float(force[2])
+        row |= self._balance.step(step.time)
         row |= measure(snapshot)
         self.rows.append(row)
         if self._root:
@@ -190,6 +193,3 @@ class _replacing:
         else:
             self.partial.unlink(missing_ok=True)
 
-
-def _key(name: str) -> str:
-    return name.replace(" ", "_")

@@ -47,6 +47,7 @@ class System:
         self._residuals: dict[str, list[Any]] = {"tows": [], "crossovers": []}
         self._tangents: dict[str, list[Any]] = {"tows": [], "crossovers": []}
         self._energies: dict[str, Any] = {}
+        self._losses: dict[str, Any] = {}
         self._term_residuals: dict[str, Any] = {}
         for term in self.terms:
             if not with_crossings[term.where]:
@@ -56,14 +57,17 @@ class System:
             self._residuals[term.where].append(residual)
             self._term_residuals[term.name] = residual
             # A rank without crossings has no forms of them, but must wait for those that have.
-            some = comm.allgather((term.tangent is not None, term.energy is not None))
-            has_tangent, has_energy = (any(flags) for flags in zip(*some, strict=True))
+            forms = (term.tangent, term.energy, term.loss)
+            some = comm.allgather([form is not None for form in forms])
+            has_tangent, has_energy, has_loss = (any(flags) for flags in zip(*some, strict=True))
             if has_tangent:
                 self._tangents[term.where].append(
                     _dolfinx.compile_form(term.tangent, comm, here=own)
                 )
             if has_energy:
                 self._energies[term.name] = _dolfinx.compile_form(term.energy, comm, here=own)
+            if has_loss:
+                self._losses[term.name] = _dolfinx.compile_form(term.loss, comm, here=own)
         tows = net.tows
         self._dw = Function(tows.space)
         self._forces = _dolfinx.compile_form(
@@ -174,16 +178,19 @@ class System:
 
     def energies(self) -> dict[str, float]:
         """Stored energy of each term that has one [N mm], summed over the ranks."""
-        names = list(self._energies)
+        return self._summed(self._energies)
+
+    def losses(self) -> dict[str, float]:
+        """Energy that each dissipative term has lost over the step [N mm], over all ranks."""
+        return self._summed(self._losses)
+
+    def _summed(self, functionals: dict[str, Any]) -> dict[str, float]:
         own = np.array(
-            [
-                0.0 if form is None else _dolfinx.cell_scalar(form)
-                for form in self._energies.values()
-            ]
+            [0.0 if form is None else _dolfinx.cell_scalar(form) for form in functionals.values()]
         )
         total = np.zeros_like(own)
         self.net.comm.Allreduce(own, total)
-        return dict(zip(names, total.tolist(), strict=True))
+        return dict(zip(functionals, total.tolist(), strict=True))
 
     def term_forces(self, name: str) -> Array:
         """Nodal forces of one tow term (the negative is what it exerts), (n_owned, 6) [N, N mm]."""

@@ -1,0 +1,80 @@
+"""The energy balance of a run, step by step.
+
+    work of tools, supports and weight = stored + kinetic + lost + remainder
+
+Work of what moves by prescription is taken with the mean of the force before and after the step,
+weight exactly, losses with the force at the end of the step. The remainder is the numerical damping
+of the time integration and the error of these sums; both vanish with the step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from .model import Model
+
+__all__ = ["Balance"]
+
+Array = npt.NDArray[np.float64]
+
+
+class Balance:
+    """Sums the work of a run. Every method is collective.
+
+    Args:
+        model: what is run.
+        past: columns of the last recorded step, to go on from; None at the start.
+    """
+
+    def __init__(self, model: Model, past: dict[str, float] | None = None) -> None:
+        self.model = model
+        past = past or {}
+        self.external = past.get("external_work_N_mm", 0.0)
+        self.lost = past.get("lost_N_mm", 0.0)
+        self._tool_force = {
+            tool.name: np.array([past.get(f"{tool.name}_force_{a}_N", 0.0) for a in "xyz"])
+            for tool in model.tools
+        }
+        self._tool_place = {tool.name: np.array(tool.path(model.time)) for tool in model.tools}
+        self._reaction: Array | None = None
+
+    def step(self, time: float) -> dict[str, float]:
+        """Columns for a converged step that ends at ``time``, its increment still in the fields."""
+        model = self.model
+        row: dict[str, float] = {}
+        for tool in model.tools:
+            force = model.tool_forces()[tool.name]
+            place = np.array(tool.path(time))
+            moved = place - self._tool_place[tool.name]
+            self.external += float((force + self._tool_force[tool.name]) @ moved) / 2.0
+            self._tool_force[tool.name], self._tool_place[tool.name] = force, place
+            row |= {f"{tool.name}_force_{a}_N": float(f) for a, f in zip("xyz", force, strict=True)}
+        self.external += model.weight_work() + self._support_work()
+
+        energies = model.system.energies()
+        losses = model.system.losses()
+        self.lost += sum(losses.values())
+        kinetic = energies.get("inertia", 0.0)
+        stored = sum(energies.values()) - kinetic
+        row |= {f"energy_{name.replace(' ', '_')}_N_mm": e for name, e in energies.items()}
+        return row | {
+            "external_work_N_mm": self.external,
+            "stored_N_mm": stored,
+            "kinetic_N_mm": kinetic,
+            "lost_N_mm": self.lost,
+            "remainder_N_mm": self.external - stored - kinetic - self.lost,
+        }
+
+    def _support_work(self) -> float:
+        """Work of the supports over the step; only those that move do any."""
+        model = self.model
+        if not model.moving_supports:
+            return 0.0
+        reaction = model.reactions()[:, :3]
+        before = np.zeros_like(reaction) if self._reaction is None else self._reaction
+        self._reaction = reaction
+        increment = model.disc.gather_nodes(
+            model.fields.w.x.array.reshape(-1, 6)[: model.disc.owned, :3]
+        )
+        return float(np.sum((reaction + before) / 2.0 * increment))
