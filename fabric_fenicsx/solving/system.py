@@ -151,8 +151,9 @@ class System:
         # meaning of a local number changes.
         A.assemble(PETSc.Mat.AssemblyType.FLUSH)
         A.setLGMap(self._lg_crossovers, self._lg_crossovers)
-        for form in self._tangents["crossovers"]:
-            _dolfinx.add_matrix(A, form)
+        if self.net.connectors is not None:
+            for form in self._tangents["crossovers"]:
+                _dolfinx.add_matrix(A, form)
         A.assemble()
         self.assemble_seconds += perf_counter() - start
 
