@@ -94,6 +94,11 @@ class SolverKeys(Keys):
     iteration_limit: Annotated[int, Field(ge=3, le=200)] = Field(
         15, description="Newton iterations after which a step has failed"
     )
+    largest_move_mm: Positive | None = Field(
+        None,
+        description="steps in which a node moves further are refused; "
+        "by default half the edge radius in a drape, no limit elsewhere",
+    )
     spectral_radius: Annotated[float, Field(ge=0.0, le=1.0)] = Field(
         0.0, description="of generalised-α at infinite frequency; 1 keeps energy"
     )

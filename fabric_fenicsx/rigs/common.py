@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -86,10 +87,13 @@ def crossover_law(keys: CrossoverKeys, warp_spacing: float, weft_spacing: float)
     )
 
 
-def control(keys: SolverKeys) -> StepControl:
-    """Step control of a case."""
+def control(keys: SolverKeys, largest_move: float = math.inf) -> StepControl:
+    """Step control of a case; ``largest_move`` [mm] holds where the case does not say."""
     return StepControl(
-        first=keys.first_step_s, smallest=keys.smallest_step_s, largest=keys.largest_step_s
+        first=keys.first_step_s,
+        smallest=keys.smallest_step_s,
+        largest=keys.largest_step_s,
+        largest_move=largest_move if keys.largest_move_mm is None else keys.largest_move_mm,
     )
 
 

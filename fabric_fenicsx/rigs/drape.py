@@ -131,7 +131,7 @@ def run(case: DrapeCase, session: Session) -> dict[str, Any]:
         session.folder,
         test="drape",
         end=case.duration_s,
-        control=control(case.solver),
+        control=control(case.solver, case.edge_radius_mm / 2.0),
         force_tolerance=case.solver.force_tolerance_N,
         iteration_limit=case.solver.iteration_limit,
         measure=measure,

@@ -12,9 +12,12 @@ rotations compose by the Cayley map, v holds material angular velocities.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
@@ -104,6 +107,8 @@ class StepControl:
         largest: never above this step [s].
         aim: iterations a step should take: above it steps shrink, below it they grow.
         grow, cut: factors on the step after an easy step and after a failed one.
+        largest_move: a step in which a node moves further than this is refused [mm]: in one long
+            step a sheet could pass through a tool unseen.
     """
 
     first: float
@@ -112,6 +117,7 @@ class StepControl:
     aim: int = 7
     grow: float = 1.5
     cut: float = 0.35
+    largest_move: float = math.inf
 
     def after(self, length: float, planned: float, iterations: int) -> float:
         """The next step after one of this length took so many iterations."""
@@ -186,7 +192,8 @@ class Stepper:
                 # Two equal steps rather than a long one and a tiny one at the end.
                 length = left if left <= 1.0001 * length else left / 2.0
             outcome = self.try_step(length)
-            if outcome.converged:
+            move = self._largest_move() if outcome.converged else 0.0
+            if outcome.converged and move <= control.largest_move:
                 self.number += 1
                 now = self.state.time + length
                 step = Step(self.number, now, length, outcome.iterations, failures)
@@ -202,11 +209,20 @@ class Stepper:
             self.wasted_iterations += outcome.iterations
             h = length * control.cut
             if h < control.smallest:
+                reason = outcome.reason
+                if outcome.converged:
+                    reason = f"a node moves by {move:.3g} mm in one step"
                 raise SolveError(
                     f"stopped at t = {self.state.time:.6g} s after {self.number} accepted steps: "
-                    f"{outcome.reason} (step {length:.3g} s, residual {outcome.residual:.3g} N; "
+                    f"{reason} (step {length:.3g} s, residual {outcome.residual:.3g} N; "
                     f"the smallest step allowed is {control.smallest:.3g} s)"
                 )
+
+    def _largest_move(self) -> float:
+        """Length of the longest displacement increment of any node [mm]."""
+        w = self.net.tows.w.x.array.reshape(-1, 6)[: self.net.owned, :3]
+        own = float(np.sqrt((w**2).sum(axis=1).max(initial=0.0)))
+        return float(self.net.comm.allreduce(own, op=MPI.MAX))
 
     def try_step(self, h: float) -> Outcome:
         """Attempt a step of length h from the accepted state."""
