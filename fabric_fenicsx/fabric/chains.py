@@ -30,7 +30,9 @@ Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
 
-def net_from_lines(points: Floats, warp: Integers, weft: Integers) -> tuple[Net, Integers]:
+def net_from_lines(
+    points: Floats, warp: Integers, weft: Integers, crossing_gap: float = 0.0
+) -> tuple[Net, Integers]:
     """Build the net of the tows that line cells form.
 
     The cells of a family must form open chains. Warp tows are directed towards +y and weft tows
@@ -46,6 +48,7 @@ def net_from_lines(points: Floats, warp: Integers, weft: Integers) -> tuple[Net,
         points: node positions [mm], shape (n, 3).
         warp: nodes of each warp cell, shape (n_warp_cells, 2).
         weft: nodes of each weft cell, shape (n_weft_cells, 2).
+        crossing_gap: largest distance in height, along z, of the two nodes of a crossing [mm].
 
     Returns:
         The net, and for each of its nodes the row of `points` it came from.
@@ -63,7 +66,7 @@ def net_from_lines(points: Floats, warp: Integers, weft: Integers) -> tuple[Net,
     begins = np.setdiff1d(np.arange(len(source)), last)
     cells = np.column_stack([begins, begins + 1])
     at = np.ascontiguousarray(points[source])
-    crossings = _crossings(at, cells, len(parts[WARP][0]))
+    crossings = _crossings(at, cells, len(parts[WARP][0]), crossing_gap)
     net = Net(
         points=at,
         cells=cells,
@@ -151,18 +154,21 @@ def _by_place(middle: Floats, start: Floats, grain: float, family: int) -> Integ
     return np.lexsort([table[:, k] for table in (start, middle, coarse) for k in reversed(keys)])
 
 
-def _crossings(points: Floats, cells: Integers, n_warp: int) -> Integers:
+def _crossings(points: Floats, cells: Integers, n_warp: int, gap: float) -> Integers:
     """Warp node and weft node of each crossing, in the order of the warp nodes."""
     lengths = np.linalg.norm(points[cells[:, 1]] - points[cells[:, 0]], axis=1)
     reach = CROSSING_TOLERANCE * lengths.mean()
-    tree = cKDTree(points[n_warp:])
-    found = tree.query(points[:n_warp], k=2, distance_upper_bound=reach)
+    # A height of reach + gap counts as much as a distance of reach in the plan.
+    scaled = points * np.array([1.0, 1.0, reach / (reach + gap)])
+    tree = cKDTree(scaled[n_warp:])
+    found = tree.query(scaled[:n_warp], k=2, distance_upper_bound=reach)
     distance, partner = np.asarray(found[0]), np.asarray(found[1])
     warp = np.flatnonzero(np.isfinite(distance[:, 0]))
     if not len(warp):
         raise ValueError(
             "groups 'warp' and 'weft' do not cross; at a crossing each has a node, "
             f"no further apart than {reach:.3g} mm"
+            + (f" in the plan and {gap:g} mm in height" if gap else "")
         )
     weft = partner[warp, 0] + n_warp
     crowded = np.isfinite(distance[warp, 1]) | (np.bincount(weft)[weft] > 1)

@@ -1,4 +1,4 @@
-"""Tow meshes as gmsh files: write the mesh of a sheet, read any tow mesh.
+"""Tow meshes as gmsh files: write the mesh of a fabric, read any tow mesh.
 
 A tow mesh has lines in the physical groups "warp" and "weft" and the tows' end points in the
 physical group "tow_ends". Its unit is the millimetre.
@@ -21,7 +21,7 @@ import numpy.typing as npt
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.chains import net_from_lines, place
 from fabric_fenicsx.fabric.net import WARP, WEFT, Net
-from fabric_fenicsx.fabric.sheet import Sheet
+from fabric_fenicsx.fabric.paths import TowPaths
 
 __all__ = ["GROUPS", "read_msh", "write_msh"]
 
@@ -45,14 +45,14 @@ OPTIONS = {
 Integers = npt.NDArray[np.int64]
 
 
-def write_msh(sheet: Sheet, path: str | Path) -> None:
-    """Write the tow mesh of a sheet, in gmsh's format 4.1 as text.
+def write_msh(fabric: TowPaths, path: str | Path) -> None:
+    """Write the tow mesh of a fabric, in gmsh's format 4.1 as text.
 
-    Every tow is a chain of straight lines from its end over its crossings to its other end. Warp
-    and weft have points of their own at a crossing. One rank alone must call it.
+    Every tow is a chain of lines or Bézier curves from its end over its crossings to its other
+    end. Warp and weft have points of their own at a crossing. One rank alone must call it.
 
     Args:
-        sheet: the sheet.
+        fabric: a `Sheet`, a `TowLayout` or anything else that knows its tows' paths.
         path: the file, with the ending .msh, in a folder that exists.
 
     Raises:
@@ -67,15 +67,16 @@ def write_msh(sheet: Sheet, path: str | Path) -> None:
         ends: list[int] = []
         for name, family in (("warp", WARP), ("weft", WEFT)):
             curves: list[int] = []
-            for across in sheet.positions(family):
-                points = [
-                    gmsh.model.geo.addPoint(*((across, s) if family == WARP else (s, across)), 0.0)
-                    for s in sheet.stations(family)
-                ]
-                for begin, end, cells in zip(
-                    points, points[1:], sheet.divisions(family).tolist(), strict=False
+            for tow in fabric.tows(family):
+                points = [gmsh.model.geo.addPoint(*at) for at in tow.stations.tolist()]
+                for begin, end, (cells, controls) in zip(
+                    points, points[1:], tow.pieces(), strict=False
                 ):
-                    curve = gmsh.model.geo.addLine(begin, end)
+                    if controls is None:
+                        curve = gmsh.model.geo.addLine(begin, end)
+                    else:
+                        inner = [gmsh.model.geo.addPoint(*at) for at in controls.tolist()]
+                        curve = gmsh.model.geo.addBezier([begin, *inner, end])
                     gmsh.model.geo.mesh.setTransfiniteCurve(curve, cells + 1)
                     curves.append(curve)
                 ends += [points[0], points[-1]]
@@ -86,7 +87,7 @@ def write_msh(sheet: Sheet, path: str | Path) -> None:
         gmsh.write(str(path))
 
 
-def read_msh(path: str | Path) -> Net:
+def read_msh(path: str | Path, *, crossing_gap: float = 0.0) -> Net:
     """Read a tow mesh, made by `write_msh` or by hand.
 
     Any format of gmsh's .msh will do, and any order of nodes, cells and tows: the net does not
@@ -94,6 +95,8 @@ def read_msh(path: str | Path) -> Net:
 
     Args:
         path: the file.
+        crossing_gap: largest distance in height, along z, of the two nodes of a crossing [mm];
+            above 0 for crimped tows.
 
     Returns:
         The net.
@@ -122,7 +125,7 @@ def read_msh(path: str | Path) -> Net:
     if not np.isfinite(points).all():
         raise InputError(f"{path}: a node's position is not a number; finite numbers are allowed")
     try:
-        net, source = net_from_lines(points, cells["warp"], cells["weft"])
+        net, source = net_from_lines(points, cells["warp"], cells["weft"], crossing_gap)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
     ends, marked = np.unique(source[net.ends]), np.unique(cells["tow_ends"])

@@ -15,11 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fabric_fenicsx.fabric.net import WARP
+from fabric_fenicsx.fabric.paths import ROUNDING, TowPath, divide
 
 __all__ = ["Sheet", "centred_sheet", "spaced_sheet"]
-
-ROUNDING = 1e-9
-"""Part of a length below which two lengths are the same."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +72,25 @@ class Sheet:
         """Cells in each piece between the stations of a tow, shape (n_stations - 1,)."""
         crossings = self.positions(1 - family)
         stations = self.stations(family)
-        pieces = np.diff(stations)
         # With a single tow across there is no spacing: the sheet's extent stands for it.
-        spacing = np.ptp(crossings) / (len(crossings) - 1) if len(crossings) > 1 else pieces.sum()
-        cells = np.floor(self.subdivisions * pieces / spacing + 0.5 + ROUNDING).astype(np.int64)
-        inner = (stations[:-1] >= crossings[0]) & (stations[1:] <= crossings[-1])
-        return np.where(inner, self.subdivisions, np.maximum(cells, 1))
+        spacing = (
+            np.ptp(crossings) / (len(crossings) - 1)
+            if len(crossings) > 1
+            else np.diff(stations).sum()
+        )
+        return divide(stations, crossings, float(spacing), self.subdivisions)
+
+    def tows(self, family: int) -> list[TowPath]:
+        """Paths of the tows of WARP or WEFT, straight in the plane z = 0."""
+        along, across = (1, 0) if family == WARP else (0, 1)
+        stations = self.stations(family)
+        cells = self.divisions(family).tolist()
+        paths = []
+        for position in self.positions(family):
+            points = np.zeros((len(stations), 3))
+            points[:, along], points[:, across] = stations, position
+            paths.append(TowPath(points, cells))
+        return paths
 
 
 def centred_sheet(

@@ -1,0 +1,78 @@
+"""The axis of a tow as gmsh draws it: stations, the cells between them, straight or bent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["ROUNDING", "TowPath", "TowPaths", "divide"]
+
+ROUNDING = 1e-9
+"""Part of a length below which two lengths are the same."""
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TowPath:
+    """A tow from its first to its last end.
+
+    Attributes:
+        stations: ends and crossings in order [mm], shape (n, 3); each becomes a node.
+        cells: cells of each piece between two stations, length n - 1.
+        controls: for each piece the two inner control points of a cubic Bézier curve [mm],
+            shape (2, 3), or None for a straight line. Empty: all are straight.
+
+    Raises:
+        ValueError: the numbers of stations, cells and controls contradict each other.
+    """
+
+    stations: Floats
+    cells: Sequence[int]
+    controls: Sequence[Floats | None] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.stations)
+        if np.shape(self.stations) != (n, 3) or n < 2:
+            raise ValueError(f"tow: stations have shape {np.shape(self.stations)}, not (n >= 2, 3)")
+        for name in ("cells", "controls"):
+            count = len(getattr(self, name))
+            if count != n - 1 and not (name == "controls" and count == 0):
+                raise ValueError(f"tow: {count} {name} for {n - 1} pieces")
+
+    def pieces(self) -> list[tuple[int, Floats | None]]:
+        """Number of cells and control points of each piece."""
+        controls = self.controls or [None] * len(self.cells)
+        return list(zip((int(n) for n in self.cells), controls, strict=True))
+
+
+class TowPaths(Protocol):
+    """A fabric for `write_msh`: anything that knows the tows of WARP and of WEFT."""
+
+    def tows(self, family: int) -> Sequence[TowPath]:
+        """Paths of the tows of WARP or WEFT."""
+        ...
+
+
+def divide(
+    stations: Floats, crossings: Floats, spacing: float, subdivisions: int
+) -> npt.NDArray[np.int64]:
+    """Cells in each piece of a tow: a fixed number between crossings, as fine beyond them.
+
+    Args:
+        stations: places along the tow [mm], increasing, shape (n,).
+        crossings: those of the crossings among them, increasing.
+        spacing: mean distance of the crossings [mm].
+        subdivisions: cells between two crossings.
+
+    Returns:
+        Number of cells, at least one, shape (n - 1,).
+    """
+    pieces = np.diff(stations)
+    cells = np.floor(subdivisions * pieces / spacing + 0.5 + ROUNDING).astype(np.int64)
+    inner = (stations[:-1] >= crossings[0]) & (stations[1:] <= crossings[-1])
+    return np.where(inner, subdivisions, np.maximum(cells, 1))
