@@ -78,6 +78,23 @@ def heavy_cantilever(weight: float) -> tuple[float, float]:
     return _tip(lambda sigma, theta: weight * sigma * np.cos(theta), 1.0)
 
 
+def heavy_cantilever_with_loads(
+    weight: float, load: float, places: list[float]
+) -> tuple[float, float]:
+    """As heavy_cantilever, with further equal weights hanging at places s/L along it.
+
+    B θ'' = −V cos θ with the weight V beyond s; ``load`` is P L²/B of each. The steps of V are
+    rounded over 1e-4 of the length, which leaves the tip's place unchanged to 1e-8.
+    """
+    at = 1.0 - np.asarray(places)
+
+    def moment_rate(sigma, theta):
+        beyond = np.sum(0.5 * (1.0 + np.tanh((sigma - at) / 1e-4)))
+        return (weight * sigma + load * beyond) * np.cos(theta)
+
+    return _tip(moment_rate, 1.0)
+
+
 def curved_cantilever(radius, angle, stiffness, force, steps: int = 4):
     """Tip displacement of a circular cantilever under a dead tip force.
 

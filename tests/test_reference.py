@@ -63,3 +63,13 @@ def test_curved_cantilever_at_a_small_force():
     bending, torsion = np.pi / 4.0 / EI, (3.0 * np.pi / 4.0 - 2.0) / GJ
     expected = P * R**3 * (bending + torsion) + P * R * np.pi / 2.0 / GA
     assert u[2] == pytest.approx(expected, rel=1e-5)
+
+
+def test_many_small_loads_are_a_weight():
+    # Twenty loads of 1/20 of the weight in the middles of equal pieces: the error is of second
+    # order in their distance, 1/400 times a factor below one.
+    places = [(k + 0.5) / 20 for k in range(20)]
+    found = reference.heavy_cantilever_with_loads(0.0, 10.0 / 20, places)
+    assert found == pytest.approx(reference.heavy_cantilever(10.0), abs=1e-3)
+    halved = reference.heavy_cantilever_with_loads(5.0, 5.0 / 20, places)
+    assert halved == pytest.approx(reference.heavy_cantilever(10.0), abs=5e-4)

@@ -1,0 +1,236 @@
+"""Time integration: the method's own relations, order 2 in the step, energy, and a frequency."""
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+from solve import GivenSection, orders, random_rotation
+
+from fabric_fenicsx.fabric.net import single_tow
+from fabric_fenicsx.solving.model import Model, Support
+from fabric_fenicsx.solving.stepping import GeneralisedAlpha, StepControl, Stepper
+
+CLAMPED = (0, 1, 2, 3, 4, 5)
+RADII = [0.0, 0.3, 0.5, 0.8, 1.0]
+
+# The method --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("radius", RADII)
+def test_parameters_meet_the_conditions_of_order_and_stability(radius):
+    m = GeneralisedAlpha(radius)
+    # Chung & Hulbert (J. Appl. Mech. 60, 1993): second order for γ = 1/2 − α_m + α_f,
+    # unconditionally stable for α_m ≤ α_f ≤ 1/2 and β ≥ 1/4 + (α_f − α_m)/2.
+    assert m.gamma == pytest.approx(0.5 - m.alpha_m + m.alpha_f, abs=1e-15)
+    assert m.alpha_m <= m.alpha_f <= 0.5
+    assert m.beta >= 0.25 + 0.5 * (m.alpha_f - m.alpha_m) - 1e-15
+
+
+def amplification(method, omega):
+    """Matrix of one step h = 1 for ẍ = −ω² x on the state (x, ẋ, a), from the three equations.
+
+    x' = x + ẋ + (1/2 − β) a + β a',  ẋ' = ẋ + (1 − γ) a + γ a',
+    (1 − α_m) a' + α_m a = −ω² ((1 − α_f) x' + α_f x).
+    """
+    m = method
+    left = np.array(
+        [
+            [1.0, 0.0, -m.beta],
+            [0.0, 1.0, -m.gamma],
+            [(1.0 - m.alpha_f) * omega**2, 0.0, 1.0 - m.alpha_m],
+        ]
+    )
+    right = np.array(
+        [
+            [1.0, 1.0, 0.5 - m.beta],
+            [0.0, 1.0, 1.0 - m.gamma],
+            [-m.alpha_f * omega**2, 0.0, -m.alpha_m],
+        ]
+    )
+    return np.linalg.solve(left, right)
+
+
+@pytest.mark.parametrize("radius", RADII)
+def test_spectral_radius_at_infinite_frequency(radius):
+    values = np.abs(np.linalg.eigvals(amplification(GeneralisedAlpha(radius), 1e6)))
+    # Triple eigenvalues: round-off enters by its cube root.
+    assert values.max() == pytest.approx(radius, abs=2e-3)
+    for omega in (1e-3, 0.1, 1.0, 10.0, 1e3):
+        values = np.abs(np.linalg.eigvals(amplification(GeneralisedAlpha(radius), omega)))
+        assert values.max() <= 1.0 + 1e-8
+
+
+@pytest.mark.parametrize("radius", [-0.1, 1.1, float("nan")])
+def test_another_radius_is_refused(radius):
+    with pytest.raises(ValueError, match="allowed is 0 to 1"):
+        GeneralisedAlpha(radius)
+
+
+# Runs --------------------------------------------------------------------------------------------
+
+
+def start(model, velocities, *, force_tolerance):
+    """A stepper of the model with velocities (n_nodes, 6) at the start, stress-free."""
+    newton = model.newton(force_tolerance=force_tolerance, limit=25)
+    stepper = Stepper(model, newton, StepControl(1.0, 1e-9, 1.0))
+    stepper.state.v[:] = velocities[model.disc.local_nodes]
+    return stepper
+
+
+def march(stepper, steps, end, observe=lambda: None):
+    for _ in range(steps):
+        outcome = stepper.try_step(end / steps)
+        assert outcome.converged, f"t = {stepper.state.time}: {outcome}"
+        observe()
+        stepper.advance(end / steps)
+
+
+def tip(model, node):
+    return model.fields.u_n.x.array.reshape(-1, 3)[model.disc.local_nodes == node][0].copy()
+
+
+def free_flight(radius, steps, turn, *, consistent=True):
+    """A beam thrown and spun in space, bending and twisting as it flies; where its end gets to.
+
+    It starts without stress. Its nodes then have no acceleration, but their material angular
+    velocities Ω change at the rate −J⁻¹(Ω × JΩ) of free bodies.
+    """
+    cells = 6
+    section = GivenSection((80.0, 40.0, 40.0, 12.0, 10.0, 20.0), (1.0, 0.3, 0.3, 0.4))
+    X = np.linspace(-2.0, 2.0, cells + 1)
+    model = Model(
+        single_tow(X[:, None] * turn[:, 0], turn[:, 2]), section, inertia=GeneralisedAlpha(radius)
+    )
+    # A spin (1, 0.4, 0.7) about the middle, a throw, and a bending 0.2 (X² − 4/3) with its slope.
+    spin, J = np.array([1.0, 0.4, 0.7]), section.mass()[1:]
+    v = np.cross(spin, X[:, None] * [1.0, 0.0, 0.0]) + np.array([0.3, -0.2, 0.1])
+    v[:, 2] += 0.2 * (X**2 - 4.0 / 3.0)
+    Omega = spin - 0.4 * X[:, None] * [0.0, 1.0, 0.0]
+    stepper = start(model, np.column_stack([v @ turn.T, Omega @ turn.T]), force_tolerance=1e-9)
+    if consistent:
+        rates = -np.cross(Omega, J * Omega) / J
+        known = np.column_stack([0.0 * v, rates @ turn.T])[model.disc.local_nodes]
+        stepper.state.vdot[:], stepper.state.a[:] = known, known
+    march(stepper, steps, 1.0)
+    return tip(model, cells) @ turn
+
+
+def flight_orders(radius, **options):
+    turn, _ = random_rotation(np.random.default_rng(8))
+    fine = free_flight(radius, 1280, turn)
+    found = [free_flight(radius, n, turn, **options) for n in (40, 80, 160)]
+    errors = np.linalg.norm(np.array(found) - fine, axis=1)
+    return orders(errors), errors
+
+
+@pytest.mark.parametrize("radius", [0.5, 1.0])
+def test_free_flight_is_of_second_order_in_the_step(radius):
+    # The fine run's own error is 1/64 of that of 160 steps: with it a method of order 2 reads
+    # log2((1/4 − 1/1024)/(1/16 − 1/1024)) = 2.02 at the end.
+    rates, errors = flight_orders(radius)
+    assert (rates >= 1.95).all() and (rates <= 2.1).all(), f"orders {rates}, errors {errors}"
+
+
+def test_a_start_with_the_wrong_acceleration_is_of_first_order():
+    rates, errors = flight_orders(1.0, consistent=False)
+    assert (rates < 1.6).all(), f"orders {rates}, errors {errors}"
+
+
+# A cantilever that swings ------------------------------------------------------------------------
+
+LENGTH, EI, RHO_A = 10.0, 1e4, 1.0
+# EA and GA are large enough, and the rotary inertia small enough, to be a Bernoulli beam to 1e-5:
+# π² EI/(GA L²) = 1e-5, and the like for the rotary inertia.
+SWINGING = GivenSection((1e8, 1e8, 1e8, 1e4, EI, 4.0 * EI), (RHO_A, 1e-5, 1e-5, 1e-5))
+
+
+def cantilever(cells, radius=1.0):
+    points = np.linspace(0.0, LENGTH, cells + 1)[:, None] * [1.0, 0.0, 0.0]
+    return Model(
+        single_tow(points, (0.0, 0.0, 1.0)),
+        SWINGING,
+        inertia=GeneralisedAlpha(radius),
+        supports=[Support(np.array([0]), CLAMPED)],
+    )
+
+
+def lowest_mode(model):
+    """Lowest frequency [rad/s] and shape (n_nodes, 6), from the tangent with and without mass."""
+    disc, system = model.disc, model.system
+    system.set_increment(disc.vector(), linearise_from="zero")
+    matrices = []
+    for c_0 in (0.0, 1.0):
+        model.set_rates(c_0, 0.0)
+        A = disc.matrix()
+        system.tangent(A)
+        matrices.append(A.convert("dense").getDenseArray().copy())
+    K, M = matrices[0], matrices[1] - matrices[0]
+    free = np.setdiff1d(np.arange(len(K)), model.fixed)
+    # M x = ω⁻² K x: the wanted value is the largest, the one that round-off spares.
+    last = [len(free) - 1] * 2
+    values, vectors = eigh(M[np.ix_(free, free)], K[np.ix_(free, free)], subset_by_index=last)
+    shape = np.zeros(len(K))
+    shape[free] = vectors[:, 0]
+    nodes = disc.gather_nodes(shape.reshape(-1, 6))
+    return 1.0 / np.sqrt(values[0]), nodes / nodes[-1, 2]
+
+
+def test_lowest_frequency_converges_to_the_analytic_one():
+    # cos λ cosh λ = −1 has λ = 1.875104; ω = λ² √(EI/ρA)/L² = 3.516015 √1e4/100.
+    exact = 1.875104068711961**2 * np.sqrt(EI / RHO_A) / LENGTH**2
+    found = np.array([lowest_mode(cantilever(n))[0] for n in (4, 8, 16, 32)])
+    errors = np.abs(found / exact - 1.0)
+    rates = orders(errors)
+    assert (rates >= 1.9).all(), f"orders {rates}, errors {errors}"
+    assert errors[-1] < 1e-3
+
+
+@pytest.mark.parametrize("radius", RADII)
+def test_a_swing_follows_the_method_step_by_step(radius):
+    # A small swing in the lowest mode, from rest with a velocity: the tip is the x of the scalar
+    # oscillator under the same method. A swing of 1e-4 of the length has nonlinear terms of 1e-8.
+    model = cantilever(8, radius)
+    omega, shape = lowest_mode(model)
+    speed = 1e-3 * omega
+    # Round-off of the axial stiffness, 1e8 N times 1e-16 of strain; inertia forces are 1e-2 N.
+    stepper = start(model, speed * shape, force_tolerance=1e-6)
+    steps, turns = 80, 2.0
+    end = turns * 2.0 * np.pi / omega
+    h = end / steps
+    energies, tips = [], []
+
+    def observe():
+        energy = model.system.energies()
+        energies.append((energy["tows"], energy["inertia"]))
+        tips.append(model.disc.current()[0][model.disc.local_nodes == 8][0][2])
+
+    march(stepper, steps, end, observe)
+    step = amplification(GeneralisedAlpha(radius), omega * h)
+    state, expected = np.array([0.0, h * speed, 0.0]), []
+    for _ in range(steps):
+        state = step @ state
+        expected.append(state[:2])
+    expected = np.array(expected)
+    np.testing.assert_allclose(tips, expected[:, 0], atol=1e-5 * 1e-3)
+    # Energies: modal mass m from the start, m ẋ²/2 and m ω² x²/2.
+    mass = kinetic_mass(model, shape)
+    stored, kinetic = np.array(energies).T
+    top = mass * speed**2 / 2.0
+    np.testing.assert_allclose(stored, mass * (omega * expected[:, 0]) ** 2 / 2.0, atol=1e-4 * top)
+    np.testing.assert_allclose(kinetic, mass * (expected[:, 1] / h) ** 2 / 2.0, atol=1e-4 * top)
+    total = (stored + kinetic) / top
+    if radius == 1.0:
+        np.testing.assert_allclose(total, 1.0, atol=1e-5)
+        # By the trapezoidal rule x = (ẋ₀/ω) sin(n φ) with tan(φ/2) = ω h/2: exact.
+        phase = 2.0 * np.arctan(omega * h / 2.0)
+        sine = np.sin(phase * np.arange(1, steps + 1))
+        np.testing.assert_allclose(tips, 1e-3 * sine, atol=1e-5 * 1e-3)
+    else:
+        assert total[-1] < 1.0 - 1e-4
+
+
+def kinetic_mass(model, shape):
+    """Modal mass with the masses lumped in the nodes."""
+    lengths = model.net.node_lengths
+    return RHO_A * np.sum(lengths * (shape[:, :3] ** 2).sum(axis=1)) + 1e-5 * np.sum(
+        lengths * (shape[:, 3:] ** 2).sum(axis=1)
+    )
