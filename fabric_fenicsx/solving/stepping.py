@@ -218,6 +218,36 @@ class Stepper:
                     f"the smallest step allowed is {control.smallest:.3g} s)"
                 )
 
+    def start_consistently(self) -> None:
+        """Give the start the acceleration that its forces ask for: M v̇ = f at t = 0. Collective.
+
+        Without it a run starts with v̇ = 0 and the method has to find the acceleration in its
+        first steps, which costs an order. To be left out where a run starts far from balance, as
+        with tools that overlap the sheet, and the first steps shall damp that away.
+        """
+        if self.alpha is None:
+            return
+        net, model = self.net, self.model
+        model.set_time(self.state.time, self.state.time + self.control.first)
+        # At c_0 = c_1 = 0 the residual is that of rest, and a* alone accelerates.
+        model.set_rates(0.0, 0.0)
+        start = net.tows.acceleration_star.x.array.reshape(-1, 6)
+        start[:] = 0.0
+        net.tows.rate_star.x.array[:] = self.state.v.ravel()
+        self.newton.x.set(0.0)
+        model.system.set_increment(self.newton.x)
+        force = -model.reactions()
+        mass = np.zeros((len(force), 6, 6))
+        for component in range(6):
+            start[:] = np.eye(6)[component]
+            mass[:, :, component] = net.gather_nodes(model.system.term_forces("inertia"))
+        start[:] = 0.0
+        acceleration = np.linalg.solve(mass, force[:, :, None])[:, :, 0]
+        nodes, components = model.fixed_components()
+        acceleration[nodes, components] = 0.0
+        self.state.vdot = acceleration[net.local_nodes]
+        self.state.a = self.state.vdot.copy()
+
     def _largest_move(self) -> float:
         """Length of the longest displacement increment of any node [mm]."""
         w = self.net.tows.w.x.array.reshape(-1, 6)[: self.net.owned, :3]
