@@ -1,7 +1,7 @@
 """The geometrically exact beam of Reissner and Simo, in the objective form of Crisfield & Jelenić.
 
     Γ = Λᵀ r′ − E1,          K = axial(Λᵀ Λ′)                            (strains)
-    (N, M) = C (Γ, K)                                                    (section, linearised)
+    (N, M) = C (Γ, K)                                                    (section)
     M += C_K τ (K − K_n)/Δt                                              (viscosity, optional)
     R(w; v) = ∫ (N, M) · δ(Γ, K) ds                                      (virtual work)
 
@@ -32,6 +32,7 @@ __all__ = [
     "beam_residual",
     "beam_tangent",
     "cell_values",
+    "linear_energy",
     "linear_section",
     "linearised_forces",
     "node_sums",
@@ -47,6 +48,11 @@ SectionLaw = Callable[[TowFields, Any], Any]
 def linear_section(fields: TowFields, e: Any) -> Any:
     """(N, M) = diag(EA, κGA, κGA, GJ, E I_out, E I_in) (Γ, K): the law at zero strain."""
     return as_vector([fields.stiffness[i] * e[i] for i in range(6)])
+
+
+def linear_energy(fields: TowFields, e: Any) -> Any:
+    """(Γ, K) · C (Γ, K) / 2 [N], per length."""
+    return inner(linear_section(fields, e), e) / 2
 
 
 def viscous_section(per_time: Any) -> SectionLaw:
@@ -89,10 +95,11 @@ def beam_residual(fields: TowFields, law: SectionLaw = linear_section) -> Any:
     return inner(law(fields, e), derivative(e, fields.w, fields.test)) * fields.middle
 
 
-def strain_energy(fields: TowFields) -> Any:
-    """Elastic energy of the linearised section, ∫ (Γ, K) · C (Γ, K) / 2 ds [N mm]."""
-    e = strain(fields)
-    return inner(linear_section(fields, e), e) / 2 * fields.middle
+def strain_energy(
+    fields: TowFields, density: Callable[[TowFields, Any], Any] = linear_energy
+) -> Any:
+    """Stored energy of the section, its ``density`` per length over the tows [N mm]."""
+    return density(fields, strain(fields)) * fields.middle
 
 
 def beam_tangent(fields: TowFields, law: SectionLaw = linear_section) -> Any:

@@ -14,9 +14,10 @@ import numpy.typing as npt
 
 from .. import _dolfinx
 from ..fabric.net import Net
-from ..fabric.section import RectangularSection
+from ..fabric.section import Section
 from ..mechanics import beam, inertia
 from ..mechanics.fields import ConnectorFields, TowFields
+from ..mechanics.section_laws import with_viscosity
 from ..mechanics.terms import Term, work_term
 from ..mechanics.tools import Tool
 from ..output.snapshot import Snapshot
@@ -24,6 +25,7 @@ from .discretisation import BLOCK, Discretisation
 from .history import Histories
 from .newton import Newton
 from .parts import ContactLaw, Contacts, Crossings, CrossoverLaw
+from .sections import SectionLawName, diagonals, elastic_section
 from .stepping import GeneralisedAlpha
 from .system import System
 from .update import rotate
@@ -55,6 +57,8 @@ class Model:
     Args:
         net: the net, on every rank.
         section: the section of all tows, or one each for warp and weft.
+        section_law: "linear" takes the sections' stiffness at zero strain, "neo_hookean" the
+            whole energy of rectangular ones.
         crossovers: law of the crossings; not needed where the net has none.
         gravity: acceleration [mm/s²].
         load: factor on gravity at a time; by default 1.
@@ -73,8 +77,9 @@ class Model:
     def __init__(
         self,
         net: Net,
-        section: RectangularSection | tuple[RectangularSection, RectangularSection],
+        section: Section | tuple[Section, Section],
         *,
+        section_law: SectionLawName = "linear",
         crossovers: CrossoverLaw | None = None,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         load: Callable[[float], float] = lambda time: 1.0,
@@ -90,13 +95,14 @@ class Model:
     ) -> None:
         pair = section if isinstance(section, tuple) else (section, section)
         family = net.tow_family[net.cell_tow]
-        stiffness = np.array([s.stiffness() for s in pair])[family]
+        stiffness = diagonals(pair)[family]
         mass = np.array([s.mass() for s in pair])[family]
         self.net, self.comm = net, comm
         self.disc = Discretisation(net, stiffness, mass, comm, interlacing)
         self.fields = self.disc.tows
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
         self._full_gravity, self._load = np.array(gravity), load
+        self.elastic = elastic_section(self.disc, pair, family, section_law)
         self._constants(mass_scale)
         self.histories = Histories(self.disc)
         self.histories.add("strain", "cells", self.fields.strain_n, beam.strain(self.fields))
@@ -125,7 +131,7 @@ class Model:
         self.mass_scale = _dolfinx.constant(mesh, mass_scale)
         self.gravity = _dolfinx.constant(mesh, tuple(self._full_gravity))
         self.relaxation = _dolfinx.constant(mesh, 0.0)
-        self.law = beam.viscous_section(self.relaxation)
+        self.law = with_viscosity(self.elastic, self.relaxation)
 
     def _tow_terms(self) -> list[Term]:
         tows = self.fields
@@ -135,7 +141,7 @@ class Model:
                 tows,
                 beam.beam_residual(tows, self.law),
                 beam.beam_tangent(tows, self.law),
-                beam.strain_energy(tows),
+                beam.strain_energy(tows, self.elastic.energy),
             )
         ]
         if np.any(self._full_gravity):

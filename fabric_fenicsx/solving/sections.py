@@ -1,0 +1,64 @@
+"""The sections of a model: from numbers per family of tows to a law with its fields."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import _dolfinx
+from ..fabric.section import RectangularSection, Section
+from ..mechanics.neo_hookean import neo_hookean_section
+from ..mechanics.section_laws import LINEAR, PACKED, ElasticSection, coupled_section
+from .discretisation import Discretisation
+
+__all__ = ["SectionLawName", "diagonals", "elastic_section"]
+
+SectionLawName = Literal["linear", "neo_hookean"]
+
+
+def diagonals(sections: Sequence[Section]) -> npt.NDArray[np.float64]:
+    """Diagonal of the stiffness of each section, shape (n, 6) [N, N mm²]."""
+    matrices = [s.stiffness() for s in sections]
+    return np.array([C if C.ndim == 1 else C.diagonal() for C in matrices])
+
+
+def elastic_section(
+    disc: Discretisation,
+    sections: Sequence[Section],
+    family: npt.NDArray[np.int64],
+    law: SectionLawName,
+) -> ElasticSection:
+    """The law of all tows: the simplest that covers every section.
+
+    Args:
+        disc: the discretised net; its fields hold the diagonals already.
+        sections: of each family.
+        family: of each cell of the net, shape (n_cells,).
+        law: "linear" for the stiffness at zero strain, "neo_hookean" for the whole energy.
+
+    Raises:
+        ValueError: an unknown law, or a section that the Neo-Hookean law does not know.
+    """
+    mesh = disc.tows.mesh
+    if law == "neo_hookean":
+        rectangles = [s for s in sections if isinstance(s, RectangularSection)]
+        if len(rectangles) < len(sections):
+            raise ValueError("the Neo-Hookean section law needs rectangular sections")
+        d = np.array([[s.compressibility] for s in rectangles])
+        if not d.any():
+            return neo_hookean_section()
+        space = _dolfinx.constants_per_cell(mesh, 1)
+        return neo_hookean_section(disc.cell_field(space, d[family]))
+    if law != "linear":
+        raise ValueError(f"unknown section law {law!r}: linear and neo_hookean are known")
+    matrices = [s.stiffness() for s in sections]
+    if all(C.ndim == 1 for C in matrices):
+        return LINEAR
+    rows, columns = np.array(PACKED).T
+    full = [np.diag(C) if C.ndim == 1 else C for C in matrices]
+    packed = np.array([C[rows, columns] for C in full])
+    space = _dolfinx.constants_per_cell(mesh, len(PACKED))
+    return coupled_section(disc.cell_field(space, packed[family]))
