@@ -7,6 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import (
+    breadth_first_order,
+    connected_components,
+    minimum_spanning_tree,
+)
 
 from .net import WARP, WEFT, Net
 
@@ -15,53 +21,45 @@ __all__ = ["areas", "crossing_numbers", "reference_angle", "tow_numbers"]
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-SAME_LINE = 1e-3
-"""Part of the mean cell length within which two pieces of tow lie on one line."""
-
-PARALLEL = 1e-3
-"""Sine below which the tows of a family are parallel."""
-
 
 def tow_numbers(net: Net) -> Integers:
-    """Number of each tow within its family from 0, along the sheet, shape (n_tows,).
+    """Number of each tow within its family from 0, shape (n_tows,).
 
-    Pieces of one tow, which a notch of the outline parts, share their number. Where the tows of a
-    family are not parallel lines, as on a preformed sheet, the order of the net counts.
+    Tows count along those of the other family: two that a tow crosses one after the other have
+    numbers in sequence, on a sheet of any shape. Pieces of one tow, which a notch of the outline
+    parts, share their number.
     """
     numbers = np.zeros(len(net.tow_family), dtype=np.int64)
-    begin, end = (net.points[net.ends[:, k]] for k in (0, 1))
-    normal = _unit(net.normals.mean(axis=0))
-    grain = SAME_LINE * float(net.lengths.mean())
+    tow = _node_tows(net)
     for family in (WARP, WEFT):
-        own = np.flatnonzero(net.tow_family == family)
-        if not len(own):
-            continue
-        chords = (end - begin)[own]
-        chords = chords - np.outer(chords @ normal, normal)
-        along = _unit(chords.mean(axis=0))
-        across = np.cross(along, normal) if family == WARP else np.cross(normal, along)
-        numbers[own] = np.arange(len(own))
-        lean = np.abs(chords @ across) / np.linalg.norm(chords, axis=1)
-        if lean.max() > PARALLEL:
-            continue
-        offsets = (begin + end)[own] @ across / 2.0
-        order = np.argsort(offsets, kind="stable")
-        lines = np.zeros(len(own), dtype=np.int64)
-        lines[order] = np.cumsum(np.diff(offsets[order], prepend=offsets[order[0]]) > grain)
-        # On a closed surface tows lie above each other: those are two.
-        low, high = begin[own] @ along, end[own] @ along
-        order = np.lexsort((low, lines))
-        same = np.diff(lines[order]) == 0
-        if not (same & (low[order][1:] < high[order][:-1] - grain)).any():
-            numbers[own] = lines
+        order = np.argsort(net.crossings[:, 1 - family])
+        mine, other = tow[net.crossings[order, family]], tow[net.crossings[order, 1 - family]]
+        next_one = np.diff(other) == 0
+        numbers += _counted(mine[:-1][next_one], mine[1:][next_one], len(numbers))
+    return numbers
+
+
+def _counted(before: Integers, after: Integers, size: int) -> Integers:
+    """Numbers that rise by one in most of the given pairs, from 0 in each connected part."""
+    shape = (size, size)
+    votes = coo_array((np.ones(len(before)), (before, after)), shape=shape).tocsr()
+    # The steps on which most tows agree: where the sheet has holes, some skip a tow.
+    tree = minimum_spanning_tree(-(votes + votes.T))
+    parts, part = connected_components(tree, directed=False)
+    numbers = np.zeros(size, dtype=np.int64)
+    for k in range(parts):
+        own = np.flatnonzero(part == k)
+        found, came_from = breadth_first_order(tree, own[0], directed=False)
+        for node in found[1:]:
+            step = 1 if votes[came_from[node], node] >= votes[node, came_from[node]] else -1
+            numbers[node] = numbers[came_from[node]] + step
+        numbers[own] -= numbers[own].min()
     return numbers
 
 
 def crossing_numbers(net: Net) -> tuple[Integers, Integers]:
     """Number of the warp tow and of the weft tow of each crossing, each (n_crossings,)."""
-    tow = np.zeros(len(net.points), dtype=np.int64)
-    tow[net.cells.ravel()] = np.repeat(net.cell_tow, 2)
-    numbers = tow_numbers(net)
+    numbers, tow = tow_numbers(net), _node_tows(net)
     return numbers[tow[net.crossings[:, 0]]], numbers[tow[net.crossings[:, 1]]]
 
 
@@ -90,8 +88,7 @@ def areas(net: Net) -> Floats:
 def _reach(net: Net, side: int) -> Floats:
     """Length [mm] of the warp (0) or weft (1) tow that each crossing stands for."""
     nodes = net.crossings[:, side]
-    tow = np.zeros(len(net.points), dtype=np.int64)
-    tow[net.cells.ravel()] = np.repeat(net.cell_tow, 2)
+    tow = _node_tows(net)
     # Nodes rise along a tow and from tow to tow. The place of a crossing is half-way between its
     # two nodes, which are apart where tows are crimped.
     order = np.argsort(nodes)
@@ -106,6 +103,12 @@ def _reach(net: Net, side: int) -> Floats:
     reach[order] = np.where(np.append(False, same), np.append(0.0, halves), first)
     reach[order] += np.where(np.append(same, False), np.append(halves, 0.0), last)
     return reach
+
+
+def _node_tows(net: Net) -> Integers:
+    tow = np.zeros(len(net.points), dtype=np.int64)
+    tow[net.cells.ravel()] = np.repeat(net.cell_tow, 2)
+    return tow
 
 
 def _at_nodes(net: Net, values: Floats) -> Floats:
