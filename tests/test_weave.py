@@ -488,6 +488,9 @@ def test_a_crimped_braid_keeps_its_crossings(tmp_path):
     flat = net_of(woven("twill_2_2", 0.0, **common), tmp_path)
     net = net_of(woven("twill_2_2", 1.0, **common), tmp_path, 1.0)
     np.testing.assert_array_equal(net.crossings, flat.crossings)
+    over = WEAVES["twill_2_2"].over(*crossing_numbers(net))
+    heights = np.diff(net.points[net.crossings][:, :, 2])[:, 0]
+    np.testing.assert_allclose(heights, np.where(over, -1.0, 1.0), atol=1e-9)
     # Where a tow climbs on one side of a crossing only, its nodal tangent leans.
     np.testing.assert_allclose(reference_angle(net), reference_angle(flat), atol=0.02)
 
@@ -544,11 +547,11 @@ def test_weights_of_a_weave(tmp_path):
         weights = crossing_weights(keys, sheet, net)
         np.testing.assert_allclose(weights.mean(), mean, rtol=1e-12)
         assert weights.max() == pytest.approx(4.0 * weights.min())
-    # Stitches 36 mm apart stand for three times the area of tows 12 mm apart.
+    # Two stitches 40 mm apart share the 120 mm of each of ten warp tows 12 mm apart.
     keys = WeaveKeys(pattern="unidirectional", weft_spacings_mm=[40.0])
     net = net_of(layout(keys, sheet, quarter=False), tmp_path)
     weights = crossing_weights(keys, sheet, net)
-    np.testing.assert_allclose(weights * 144.0, 12.0 * np.array([60.0] * 20), rtol=1e-9)
+    np.testing.assert_allclose(weights * 144.0, np.full(20, 12.0 * 60.0), rtol=1e-9)
 
 
 def test_keys_name_draw_or_list_a_weave(tmp_path):
