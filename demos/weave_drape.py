@@ -1,0 +1,110 @@
+# %% [markdown]
+# # How the weave changes the drape
+#
+# The same tows and the same shear law per area, woven in three ways, drape over a hemisphere.
+# The longer the floats, the fewer crossings lock the tows, and the softer is the sheet in its
+# plane; see `demos/weaves.py` for the rule, which is an assumption of this package. A coarse net
+# (tows 24 mm apart, a quarter of the sheet) makes the comparison quick.
+#
+# ```
+# python demos/weave_drape.py      # or: mpirun -n 2 python demos/weave_drape.py
+# ```
+
+# %%
+from pathlib import Path
+from time import perf_counter
+
+from mpi4py import MPI
+
+import numpy as np
+
+from fabric_fenicsx.fabric.crossings import crossing_numbers
+from fabric_fenicsx.fabric.weave import WEAVES
+from fabric_fenicsx.output.pictures import draw_net
+from fabric_fenicsx.rigs import drape
+from fabric_fenicsx.rigs.cases import DrapeCase
+from fabric_fenicsx.rigs.common import Session, control, crossover_law, section, tow_net
+from fabric_fenicsx.solving.model import Model
+from fabric_fenicsx.solving.record import prepare_folder
+from fabric_fenicsx.solving.simulation import simulate
+from fabric_fenicsx.solving.stepping import GeneralisedAlpha
+
+# %% [markdown]
+# The sheet of `demos/drape.yaml` with half as many tows. Each is as wide as two of those, so that
+# the sheet keeps its weight and its stiffness against bending out of its plane.
+
+# %%
+CASE = DrapeCase.model_validate(
+    {
+        "test": "drape",
+        "sheet": {"warp_spacing_mm": 24.0, "weft_spacing_mm": 24.0},
+        "tow": {"width_mm": 9.14},
+    }
+)
+NAMES = ("plain", "twill_2_2", "satin_8")
+
+
+def main(folder: Path = Path("results/weave_drape"), duration: float = 60.0) -> dict[str, dict]:
+    """Drape each weave for ``duration`` seconds; 60 is the whole draw.
+
+    Returns:
+        For each its mean float [crossings], largest and mean shear angle [degrees], force of the
+        whole punch [N] and energy of the in-plane springs [N mm].
+    """
+    comm = MPI.COMM_WORLD
+    numbers = {}
+    for name in NAMES:
+        own = folder / name
+        prepare_folder(own, comm)
+        session = Session(own, comm, Path(), perf_counter())
+        net = tow_net(CASE, drape.flat_sheet(CASE), session)
+        weave = WEAVES[name]
+        model = Model(
+            net,
+            section(CASE.tow),
+            crossovers=crossover_law(CASE.crossover, 24.0, 24.0),
+            gravity=(0.0, 0.0, -CASE.gravity_mm_s2),
+            inertia=GeneralisedAlpha(CASE.solver.spectral_radius),
+            viscosity=CASE.tow.relaxation_time_s,
+            tools=drape.tools(CASE),
+            contact_law=drape.contact_law(CASE.contact),
+            supports=drape.symmetry_planes(net),
+            interlacing=weave.interlacing(*crossing_numbers(net)),
+            comm=comm,
+        )
+        run = simulate(
+            model,
+            own,
+            test="drape",
+            end=duration,
+            control=control(CASE.solver),
+            force_tolerance=CASE.solver.force_tolerance_N,
+        )
+        if run.last is None or run.last.time < duration:
+            raise SystemExit(f"{name}: {run.stop}")
+        shear = np.abs(run.last.shear_angle)
+        row = run.rows[-1]
+        numbers[name] = {
+            "mean_float": weave.float_length[0],
+            "largest_shear_deg": float(np.degrees(shear.max())),
+            "mean_shear_deg": float(np.degrees(shear.mean())),
+            "punch_force_N": -4.0 * row["punch_force_z_N"],
+            "shear_energy_N_mm": row["energy_rotational_spring_N_mm"],
+        }
+        if comm.rank == 0:
+            draw_net(
+                own / "drape.png",
+                net,
+                run.last,
+                mirror=True,
+                title=name.replace("_", " "),
+                limits=(0.0, 40.0),
+            )
+    return numbers
+
+
+if __name__ == "__main__":
+    table = main()
+    if MPI.COMM_WORLD.rank == 0:
+        for title, row in table.items():
+            print(f"{title:12}" + "  ".join(f"{key} {value:.4g}" for key, value in row.items()))
