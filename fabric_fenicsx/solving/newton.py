@@ -44,7 +44,6 @@ class Newton:
         system: what to solve.
         fixed: scalar rows of this rank whose increment is prescribed.
         force_tolerance: residual norm [N, N mm] at which the nodes are in balance.
-        step_tolerance: largest change of an unknown [mm, rad] that counts as no change.
         limit: iterations after which a step has failed.
         prefix: PETSc options prefix, the same on all ranks.
     """
@@ -55,13 +54,11 @@ class Newton:
         fixed: npt.NDArray[Any],
         *,
         force_tolerance: float,
-        step_tolerance: float = 1e-6,
         limit: int = 25,
         prefix: str = "fabric_",
     ) -> None:
         self.system = system
         self.force_tolerance = force_tolerance
-        self.step_tolerance = step_tolerance
         self.limit = limit
         self.iterations = 0
         self.factorisations = 0

@@ -100,6 +100,8 @@ def simulate(
     try:
         for stop_at in (*sorted(stops), end):
             stepper.run(stop_at)
+            # Beyond a corner of the motion the last step is no guide.
+            stepper.state.previous[:] = 0.0
     except SolveError as error:
         stop = str(error)
     seconds = {
