@@ -476,6 +476,16 @@ def test_floats_are_straight_and_longer_floats_crimp_less(tmp_path):
     assert set(straight.points[:, 2].tolist()) == {-0.5, 0.5}
 
 
+def test_the_pattern_begins_with_the_first_tow_on_the_sheet(tmp_path):
+    # Of the warp tows at 1, 11, 21, ... the outline leaves those from 21 on.
+    families = TowFamily(90.0, tuple(range(1, 72, 10))), TowFamily(0.0, (5.0, 15.0, 25.0))
+    square, weave = rectangle((15, 65), (0, 30)), WEAVES["twill_2_1"]
+    net = net_of(TowLayout(*families, square, crimp=1.0, pattern=weave), tmp_path, 1.0)
+    over = net.points[net.crossings[:, 0], 2] > 0.0
+    assert len(over) == 15
+    np.testing.assert_array_equal(over, weave.over(*crossing_numbers(net)))
+
+
 def test_crimped_nodes_are_no_crossing_without_the_gap(tmp_path):
     write_msh(woven("plain", 1.0), tmp_path / "tows.msh")
     for gap in (0.0, 0.5):
@@ -505,6 +515,21 @@ def test_numbers_do_not_depend_on_the_order_of_tows(tmp_path):
     other = replace(net, crossings=net.crossings[order])
     for function in (lambda n: np.array(crossing_numbers(n)).T, reference_angle, areas):
         np.testing.assert_allclose(function(other), function(net)[order], rtol=1e-12, atol=1e-15)
+
+
+def test_numbers_follow_the_sheet_where_the_order_of_the_net_does_not(tmp_path):
+    # Tows of the net go by the x of their middles. On a strip down to the left the warp tows at 60
+    # degrees, which count to the lower right, come the other way round.
+    down, half = np.array([-0.3, -0.95]), np.array([12.0, 0.0])
+    corners = [-60 * down - half, -60 * down + half, 60 * down + half, 60 * down - half]
+    tows = spaced_layout(
+        Polygon(tuple(map(tuple, corners))), warp_angle=60.0, warp_spacing=4.0, weft_spacing=4.0
+    )
+    net = net_of(tows, tmp_path)
+    i, _ = crossing_numbers(net)
+    right = net.points[net.crossings[:, 0]] @ [sin(radians(60.0)), -cos(radians(60.0)), 0.0]
+    np.testing.assert_allclose(right - right.min(), 4.0 * i, atol=1e-9)
+    assert i[0] > 0
 
 
 def test_a_bent_sheet_is_numbered_all_the_same(tmp_path):
