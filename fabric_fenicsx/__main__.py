@@ -19,7 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     from .cli import app
     from .errors import InputError
-    from .parallel import rank
+    from .parallel import launched, rank
 
     if rank() != 0:
         sys.stdout = open(os.devnull, "w")
@@ -33,7 +33,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
             raise
         message = " ".join(error.format_message().split())
         if rank() == 0 and message:
-            print(f"{message} (fabric-fenicsx --help lists what is allowed)", file=sys.stderr)
+            print(
+                f"{message} (fabric-fenicsx --help lists what is allowed)",
+                file=sys.stderr,
+                flush=True,
+            )
+        if launched():
+            # mpirun ends all ranks with the first that leaves: leave together, after the line.
+            from mpi4py import MPI
+
+            MPI.COMM_WORLD.barrier()
         code = InputError.exit_code
     sys.stdout.flush()
     sys.exit(code)

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import os
 
-__all__ = ["rank"]
+__all__ = ["launched", "rank"]
 
 NAMES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
+
+
+def launched() -> bool:
+    """Whether mpirun has started this process."""
+    return any(name in os.environ for name in NAMES)
 
 
 def rank() -> int:
