@@ -12,6 +12,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from .weave_keys import WeaveKeys
+
 __all__ = [
     "Assumptions",
     "CantileverCase",
@@ -156,6 +158,9 @@ class DrapeCase(Common):
 
     test: Literal["drape"]
     sheet: SheetKeys = Field(default_factory=SheetKeys, description="ignored where `mesh` is given")
+    weave: WeaveKeys | None = Field(
+        None, description="another weave than a plain one of straight tows at right angles"
+    )
     symmetry: Literal["quarter", "none"] = Field(
         "quarter", description="model x >= 0, y >= 0 only, or the whole sheet"
     )

@@ -17,6 +17,7 @@ import pandas as pd
 
 from ..errors import InputError
 from ..fabric.gmsh_io import read_msh, write_msh
+from ..fabric.layout import TowLayout
 from ..fabric.net import Net
 from ..fabric.section import RectangularSection
 from ..fabric.sheet import Sheet
@@ -97,8 +98,16 @@ def control(keys: SolverKeys, largest_move: float = math.inf) -> StepControl:
     )
 
 
-def tow_net(case: Common, sheet: Sheet, session: Session) -> Net:
+def tow_net(
+    case: Common, sheet: Sheet | TowLayout, session: Session, *, crossing_gap: float = 0.0
+) -> Net:
     """The net of a case: from its .msh, or from the sheet by gmsh. Collective.
+
+    Args:
+        case: the case.
+        sheet: its tows, where it names no .msh.
+        session: where it is run.
+        crossing_gap: largest distance of the two nodes of a crossing along the normal [mm].
 
     Raises:
         InputError: the mesh cannot be read (on every rank).
@@ -109,12 +118,12 @@ def tow_net(case: Common, sheet: Sheet, session: Session) -> Net:
     if session.root:
         try:
             if case.mesh is not None:
-                net = read_msh(session.base / case.mesh)
+                net = read_msh(session.base / case.mesh, crossing_gap=crossing_gap)
             else:
                 with tempfile.TemporaryDirectory() as folder:
                     path = Path(folder) / "tows.msh"
                     write_msh(sheet, path)
-                    net = read_msh(path)
+                    net = read_msh(path, crossing_gap=crossing_gap)
         except InputError as error:
             problem = str(error)
     problem = comm.bcast(problem)

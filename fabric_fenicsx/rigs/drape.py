@@ -12,6 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
+from ..fabric.crossings import reference_angle
+from ..fabric.layout import TowLayout
 from ..fabric.net import Net
 from ..fabric.sheet import Sheet, centred_sheet
 from ..mechanics.tools import HoledPlate, Sphere, Tool
@@ -23,13 +25,16 @@ from ..solving.simulation import Run, simulate
 from ..solving.stepping import GeneralisedAlpha
 from .cases import ContactKeys, DrapeCase
 from .common import Session, control, crossover_law, extend, lowest, section, tow_net, write_table
+from .weave_keys import crossing_weights, layout
 
 __all__ = ["angles_at", "build", "flat_sheet", "run", "tools"]
 
 
-def flat_sheet(case: DrapeCase) -> Sheet:
+def flat_sheet(case: DrapeCase, session: Session) -> Sheet | TowLayout:
     """The sheet of the case, or its quarter."""
     keys = case.sheet
+    if case.weave is not None:
+        return layout(case.weave, keys, quarter=case.symmetry == "quarter", base=session.base)
     return centred_sheet(
         keys.width_mm,
         keys.length_mm,
@@ -78,8 +83,9 @@ def contact_law(keys: ContactKeys) -> ContactLaw:
 
 def build(case: DrapeCase, session: Session) -> Model:
     """The model of a drape case. Collective."""
-    net = tow_net(case, flat_sheet(case), session)
-    keys = case.sheet
+    keys, weave = case.sheet, case.weave
+    crimp = 0.0 if weave is None else weave.crimp_mm
+    net = tow_net(case, flat_sheet(case, session), session, crossing_gap=crimp)
     return Model(
         net,
         section(case.tow),
@@ -91,8 +97,14 @@ def build(case: DrapeCase, session: Session) -> Model:
         tools=tools(case),
         contact_law=contact_law(case.contact),
         supports=symmetry_planes(net) if case.symmetry == "quarter" else (),
+        interlacing=None if weave is None else crossing_weights(weave, keys, net, session.base),
         comm=session.comm,
     )
+
+
+def tow_angles(net: Net, shear_angle: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Acute angle between the tows of each crossing [degrees], from its shear angle γ [rad]."""
+    return 90.0 - np.degrees(np.abs(shear_angle + reference_angle(net)))
 
 
 def angles_at(
@@ -109,7 +121,7 @@ def angles_at(
         places: x and y on the undeformed sheet [mm], (n, 2).
     """
     flat = net.points[net.crossings].mean(axis=1)[:, :2]
-    angle = 90.0 - np.degrees(np.abs(shear_angle))
+    angle = tow_angles(net, shear_angle)
     inside = LinearNDInterpolator(flat, angle)(places)
     outside = NearestNDInterpolator(flat, angle)(places)
     return np.where(np.isnan(inside), outside, inside)
@@ -185,7 +197,7 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
     now = flat + snapshot.displacement[net.crossings].mean(axis=1)
     columns = {"x0_mm": flat[:, 0], "y0_mm": flat[:, 1]}
     columns |= {f"{axis}_mm": now[:, i] for i, axis in enumerate("xyz")}
-    columns["angle_deg"] = 90.0 - np.degrees(np.abs(snapshot.shear_angle))
+    columns["angle_deg"] = tow_angles(net, snapshot.shear_angle)
     write_table(session, "crossings.csv", columns)
 
 

@@ -20,6 +20,7 @@ from dolfinx.fem import Function
 from scipy import sparse
 
 from .. import _dolfinx
+from ..fabric.crossings import reference_angle
 from ..fabric.net import Net
 from ..mechanics.fields import ConnectorFields, TowFields
 from .update import advance
@@ -154,7 +155,7 @@ class Discretisation:
             warp=self.crossing_field(vectors, directions["warp"]),
             weft=self.crossing_field(vectors, directions["weft"]),
             normal=self.crossing_field(vectors, directions["normal"]),
-            angle_0=self.crossing_field(numbers, reference_angle(**directions)),
+            angle_0=self.crossing_field(numbers, reference_angle(net)),
             interlacing=self.crossing_field(numbers, self.interlacing),
         )
 
@@ -293,13 +294,6 @@ class Discretisation:
         update(self.tows)
         if self.connectors is not None:
             update(self.connectors)
-
-
-def reference_angle(warp: Array, weft: Array, normal: Array) -> Array:
-    """In-plane angle of undeformed crossings beyond 90° [rad], as mechanics.crossover counts it."""
-    cosine = np.einsum("ij,ij->i", weft, warp)
-    sine = np.einsum("ij,ij->i", normal, np.cross(weft, warp))
-    return np.arctan2(cosine, sine)
 
 
 def expand(blocks: npt.NDArray[Any]) -> npt.NDArray[Any]:
