@@ -79,6 +79,7 @@ def shooting(C, theta, grams):
     return found[:3, 0] - [MEASURED_AT, 0.0, 0.0]
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("beam", ["b2", "b3"])
 def test_coupled_section_converges_to_shooting(beam):
     exact = shooting(matrix(beam), 45, 400)

@@ -441,6 +441,7 @@ def test_beam_tangent_and_energy_by_taylor(kind):
     assert (np.abs(orders(left) - 2.0) < 0.1).all(), f"orders {orders(left)}"
 
 
+@pytest.mark.mpi
 def test_thin_tow_hardly_knows_the_difference():
     """The paper's tow in bending: its edge strains by b K/2, so both laws agree to that squared.
 
