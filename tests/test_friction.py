@@ -63,8 +63,8 @@ def test_slides_above_the_friction_angle():
     """Acceleration g (sin φ − μ cos φ), so the slip is half of it times t².
 
     The stick stretches by μ p / k_t = 0.3 · 1.1e-5 / 0.5 = 7e-6 mm before it slides: nothing
-    against the slip of 47 mm. The run starts with v̇ = 0 although the tow accelerates at once, an error of
-    first order: it halves with the step, and extrapolating it away leaves the exact slip.
+    against the slip of 47 mm. The run starts with v̇ = 0 although the tow accelerates at once, an
+    error of first order: it halves with the step, and extrapolating it away leaves the exact slip.
     """
     slope, end = np.radians(30.0), 0.2
     exact = GRAVITY * (np.sin(slope) - MU * np.cos(slope)) * end**2 / 2.0

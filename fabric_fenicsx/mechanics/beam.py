@@ -38,6 +38,7 @@ __all__ = [
     "node_sums",
     "strain",
     "strain_energy",
+    "viscous_loss",
     "viscous_section",
 ]
 
@@ -100,6 +101,13 @@ def strain_energy(
 ) -> Any:
     """Stored energy of the section, its ``density`` per length over the tows [N mm]."""
     return density(fields, strain(fields)) * fields.middle
+
+
+def viscous_loss(fields: TowFields, per_time: Any) -> Any:
+    """Energy that the viscosity takes over a step [N mm], ∫ C_K τ/Δt (K − K_n)² ds."""
+    e = strain(fields)
+    rates = [fields.stiffness[i] * (e[i] - fields.strain_n[i]) ** 2 for i in (3, 4, 5)]
+    return per_time * sum(rates) * fields.middle
 
 
 def beam_tangent(fields: TowFields, law: SectionLaw = linear_section) -> Any:

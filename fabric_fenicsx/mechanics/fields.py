@@ -37,23 +37,15 @@ def rotation_part(w: Any) -> Any:
     return as_vector([w[3], w[4], w[5]])
 
 
-@dataclass(frozen=True, slots=True)
-class TowFields:
-    """Coefficients on the tow mesh. In a two-node cell a linear field is its mean and its jump.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fields:
+    """What both meshes have.
 
     Attributes:
-        mesh: the dolfinx mesh of the tows, intervals in 3D.
+        mesh: the dolfinx mesh.
         space: the six-component space of w.
         w: the step's increment (Δu, θ).
         u_n, q_n: accepted displacement [mm] and rotation (unit quaternion).
-        normal: the sheet's unit normal in each cell.
-        stiffness: diagonal of the section law at zero strain in each cell,
-            (EA, κGA, κGA, GJ, E I_out, E I_in) [N, N mm²].
-        mass: mass [tonne/mm] and rotary inertia about the three directors [tonne mm].
-        section_forces: (N, M) [N, N mm] that the tangent's geometric part uses.
-        strain_n: (Γ, K) [-, 1/mm] at the start of the step.
-        rate_star, acceleration_star: the parts of velocity and acceleration known before the
-            step, so that v = c_1 w + v*, a = c_0 w + a*.
     """
 
     mesh: Any
@@ -61,13 +53,6 @@ class TowFields:
     w: Any
     u_n: Any
     q_n: Any
-    normal: Any
-    stiffness: Any
-    mass: Any
-    section_forces: Any
-    strain_n: Any
-    rate_star: Any
-    acceleration_star: Any
 
     @property
     def test(self) -> Any:
@@ -78,6 +63,32 @@ class TowFields:
     def trial(self) -> Any:
         """Increment of the increment, dw."""
         return TrialFunction(self.space)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TowFields(Fields):
+    """Coefficients on the tow mesh, two-node intervals in 3D.
+
+    In such a cell a linear field is its mean and its jump.
+
+    Attributes:
+        normal: the sheet's unit normal in each cell.
+        stiffness: diagonal of the section law at zero strain in each cell,
+            (EA, κGA, κGA, GJ, E I_out, E I_in) [N, N mm²].
+        mass: mass [tonne/mm] and rotary inertia about the three directors [tonne mm].
+        section_forces: (N, M) [N, N mm] that the tangent's geometric part uses.
+        strain_n: (Γ, K) [-, 1/mm] at the start of the step.
+        rate_star, acceleration_star: the parts of velocity and acceleration known before the
+            step, so that v = c_1 w + v*, a = c_0 w + a*.
+    """
+
+    normal: Any
+    stiffness: Any
+    mass: Any
+    section_forces: Any
+    strain_n: Any
+    rate_star: Any
+    acceleration_star: Any
 
     @property
     def middle(self) -> Any:
@@ -121,40 +132,24 @@ class TowFields:
         return compose(q1, cayley(rotation_part(w1))), compose(q2, cayley(rotation_part(w2)))
 
 
-@dataclass(frozen=True, slots=True)
-class ConnectorFields:
-    """Coefficients on the connector mesh: one unit interval per crossing, warp end then weft end.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConnectorFields(Fields):
+    """Coefficients on the connector mesh, one unit interval per crossing.
+
+    The intervals are disjoint; their first end stands for the warp node, the second for the weft's.
 
     Attributes:
-        mesh: disjoint unit intervals.
-        space: the six-component space of w on them.
-        w, u_n, q_n: as for the tows, at the two ends.
         warp, weft: unit tangents of the tows before deformation, per crossing.
         normal: the sheet's unit normal there.
         angle_0: in-plane angle beyond 90° between the tows before deformation [rad]; 0 in a weave.
         interlacing: share of the in-plane moments that acts at a crossing [-]; 1 in a plain weave.
     """
 
-    mesh: Any
-    space: Any
-    w: Any
-    u_n: Any
-    q_n: Any
     warp: Any
     weft: Any
     normal: Any
     angle_0: Any
     interlacing: Any
-
-    @property
-    def test(self) -> Any:
-        """Virtual increment v."""
-        return TestFunction(self.space)
-
-    @property
-    def trial(self) -> Any:
-        """Increment of the increment, dw."""
-        return TrialFunction(self.space)
 
     @property
     def point(self) -> Any:

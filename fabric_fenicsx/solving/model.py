@@ -98,6 +98,8 @@ class Model:
         stiffness = diagonals(pair)[family]
         mass = np.array([s.mass() for s in pair])[family]
         self.net, self.comm = net, comm
+        self.time = 0.0
+        self._supports = list(supports)
         self.disc = Discretisation(net, stiffness, mass, comm, interlacing)
         self.fields = self.disc.tows
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
@@ -142,6 +144,7 @@ class Model:
                 beam.beam_residual(tows, self.law),
                 beam.beam_tangent(tows, self.law),
                 beam.strain_energy(tows, self.elastic.energy),
+                beam.viscous_loss(tows, self.relaxation),
             )
         ]
         if np.any(self._full_gravity):
@@ -191,12 +194,26 @@ class Model:
 
     def set_time(self, start: float, end: float) -> None:
         """Move the tools to their places at the end of the step and set what depends on Δt."""
+        self.time = start
         self.gravity.value[:] = self._load(end) * self._full_gravity
         self.relaxation.value = self.viscosity / (end - start)
         if self.crossings is not None:
             self.crossings.set_step(end - start)
         if self.contacts is not None:
             self.contacts.set_time(start, end)
+
+    @property
+    def moving_supports(self) -> bool:
+        """Whether any support is moved rather than held."""
+        return any(support.displacement is not None for support in self._supports)
+
+    def fixed_components(self) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """Net nodes and components of every fixed row of every support."""
+        nodes = [np.repeat(s.nodes, len(s.components)) for s in self._supports]
+        components = [np.tile(s.components, len(s.nodes)) for s in self._supports]
+        if not nodes:
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        return np.concatenate(nodes), np.concatenate(components)
 
     def set_rates(self, c_0: float, c_1: float) -> None:
         """Constants of the time integration for this step."""
@@ -219,6 +236,14 @@ class Model:
             own = -self._on_nodes(tool).sum(axis=0)
             forces[tool.name] = self.comm.allreduce(own)
         return forces
+
+    def weight_work(self) -> float:
+        """Work of gravity over the step whose increment stands in the fields [N mm]."""
+        if not np.any(self._full_gravity):
+            return 0.0
+        increment = self.fields.w.x.array.reshape(-1, BLOCK)[: self.disc.owned]
+        own = -float(np.sum(self.system.term_forces("weight") * increment))
+        return float(self.comm.allreduce(own))
 
     def _on_nodes(self, tool: Tool) -> Array:
         """Pressure and friction of a tool on this rank's own nodes, reversed, (n_owned, 3) [N]."""

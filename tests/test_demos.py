@@ -1,0 +1,50 @@
+"""The demos run, and their numbers are right. Found by name, so that none is forgotten."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from fabric_fenicsx.rigs.load import load_case
+
+DEMOS = Path(__file__).parents[1] / "demos"
+
+
+def demo(name):
+    """A demo as a module."""
+    spec = importlib.util.spec_from_file_location(f"demo_{name}", DEMOS / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("path", sorted(DEMOS.glob("*.yaml")), ids=lambda path: path.name)
+def test_case_files_are_valid(path):
+    assert load_case(path).title
+
+
+def test_cantilever_hangs_like_the_elastica(tmp_path):
+    """Weights of the crossing tows hang at the crossings, every 12 mm, and not spread.
+
+    On the shortest strip with its six or so of them that is 1.1 % of the drop; less on longer ones.
+    """
+    drops = demo("cantilever").main(tmp_path)
+    assert list(drops) == [76.2, 152.4, 228.6]
+    for (net, exact), tolerance in zip(drops.values(), (1.5e-2, 3e-3, 1e-3), strict=True):
+        assert net == pytest.approx(exact, rel=tolerance)
+    assert (tmp_path / "shape.png").stat().st_size > 10_000
+
+
+def test_picture_frame_carries_the_crossings_moment(tmp_path):
+    """Real tows bend in their plane: on the free length of 54 mm to the bars by about 0.5 %."""
+    deviations = demo("picture_frame").main(tmp_path)
+    assert 1e-3 < deviations["elastic"] < 8e-3
+    assert 1e-3 < deviations["viscous"] < 8e-3
+
+
+def test_drape_starts(tmp_path):
+    """The first 6 mm of the draw: the apex follows the punch, the picture is drawn."""
+    numbers = demo("drape").main(tmp_path, duration=5.5)
+    assert numbers["depth_mm"] == pytest.approx(5.5 * 65.0 / 60.0)
+    assert 0.0 < numbers["largest_shear_deg"] < 15.0
+    assert (tmp_path / "drape.png").stat().st_size > 10_000
