@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fabric_fenicsx.errors import InputError
@@ -193,3 +194,49 @@ def test_every_key_is_documented():
 
 def test_long_values_are_shortened():
     assert len(plain("x" * 500)) == 60
+
+
+@pytest.mark.parametrize(
+    ("laws", "expected"),
+    [
+        (
+            "[{law: dahl, limit_N_mm: 1}]",
+            "crossover.laws.0.law: 'dahl', allowed is tabulated_spring",
+        ),
+        ("[{limit_N_mm: 1}]", "crossover.laws.0.law: missing, allowed is tabulated_spring"),
+        (
+            "[{law: locking, angle_deg: -1, k_N_mm: 1}]",
+            "angle_deg: -1, allowed is a number greater than 0",
+        ),
+        ("[{law: maxwell, k_N_mm: 1}]", "relaxation_time_s: missing"),
+        (
+            "[{law: maxwell, k_N_m: 1, k_N_mm: 1, relaxation_time_s: 1}]",
+            "unknown key, did you mean k_N_mm?",
+        ),
+        (
+            "[{law: tabulated_spring, angles_deg: [0, 9], moments_N_mm: [1, 2]}]",
+            "the table starts at",
+        ),
+    ],
+)
+def test_shear_laws_in_a_case(tmp_path, laws, expected):
+    """Laws that a key tells apart: the line names the law's own key."""
+    path = tmp_path / "case.yaml"
+    path.write_text(f"test: picture_frame\ncrossover: {{laws: {laws}}}\n")
+    with pytest.raises(InputError) as error:
+        load_case(path)
+    assert expected in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_shear_laws_become_laws_of_a_crossing(tmp_path):
+    """Per area times the area of a crossing: 0.01 N/mm on 144 mm² is 1.44 N mm."""
+    path = tmp_path / "case.yaml"
+    path.write_text(
+        "test: picture_frame\n"
+        "crossover: {laws: [{law: dahl_friction, limit_N_mm: 0.01, stick_angle_deg: 1}]}\n"
+    )
+    (law,) = load_case(path).crossover.laws
+    friction = law.build(144.0)
+    assert friction.limit == pytest.approx(1.44)
+    assert friction.stiffness == pytest.approx(1.44 / np.radians(1.0))

@@ -103,11 +103,17 @@ def strain_energy(
     return density(fields, strain(fields)) * fields.middle
 
 
-def viscous_loss(fields: TowFields, per_time: Any) -> Any:
-    """Energy that the viscosity takes over a step [N mm], ∫ C_K τ/Δt (K − K_n)² ds."""
+def viscous_loss(fields: TowFields, per_time: Any, at_zero: SectionLaw = linear_section) -> Any:
+    """Energy that the viscosity takes over a step [N mm], ∫ C τ/Δt (K − K_n) · (K − K_n) ds.
+
+    Args:
+        fields: of the tows.
+        per_time: τ/Δt [-].
+        at_zero: the section law linearised at zero strain, C.
+    """
     e = strain(fields)
-    rates = [fields.stiffness[i] * (e[i] - fields.strain_n[i]) ** 2 for i in (3, 4, 5)]
-    return per_time * sum(rates) * fields.middle
+    change = as_vector([e[i] - fields.strain_n[i] if i > 2 else 0 for i in range(6)])
+    return per_time * inner(at_zero(fields, change), change) * fields.middle
 
 
 def beam_tangent(fields: TowFields, law: SectionLaw = linear_section) -> Any:

@@ -44,6 +44,7 @@ def build(case: CantileverCase, length: float, session: Session) -> Model:
     return Model(
         net,
         section(case.tow),
+        section_law=case.tow.section_law,
         crossovers=crossover_law(case.crossover, case.warp_spacing_mm, case.weft_spacing_mm),
         gravity=(0.0, 0.0, -case.gravity_mm_s2),
         load=lambda time: time,

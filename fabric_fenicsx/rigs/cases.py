@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from .shear_law_keys import ShearLawKeys
 from .weave_keys import WeaveKeys
 
 __all__ = [
@@ -45,6 +46,10 @@ class TowKeys(Keys):
     height_mm: Positive = Field(0.04, description="b, height of the section across the sheet")
     density_kg_mm3: Positive = Field(7.0e-6, description="ρ")
     C1_MPa: Positive = Field(60000.0, description="Neo-Hookean constant; E = 6 C1, G = 2 C1")
+    D1_per_MPa: NotNegative = Field(0.0, description="compressibility; 0: incompressible")
+    section_law: Literal["linear", "neo_hookean"] = Field(
+        "linear", description="linearised at zero strain, or integrated over the section"
+    )
     shear_correction: Positive = Field(5.0 / 6.0, description="factor on the shear stiffness")
     relaxation_time_s: NotNegative = Field(
         1.0, description="viscosity of bending and twist as a relaxation time; 0: elastic"
@@ -60,6 +65,11 @@ class CrossoverKeys(Keys):
     dashpot_N_s_mm: NotNegative = Field(2.0, description="β, viscous moment per area and rate")
     alignment_N_mm: Positive = Field(
         1000.0, description="moment per crossing that keeps the sheet normals of the tows aligned"
+    )
+    laws: list[ShearLawKeys] = Field(
+        default_factory=list,
+        description="further in-plane moments: tabulated_spring, power_dashpot, tabulated_dashpot, "
+        "maxwell, coulomb_friction, dahl_friction, locking",
     )
 
 

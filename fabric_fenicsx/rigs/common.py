@@ -72,6 +72,7 @@ def section(keys: TowKeys) -> RectangularSection:
         height=keys.height_mm,
         density=keys.density_kg_mm3 * 1e-3,
         C1=keys.C1_MPa,
+        D1=keys.D1_per_MPa,
         shear_correction=keys.shear_correction,
     )
 
@@ -85,6 +86,7 @@ def crossover_law(keys: CrossoverKeys, warp_spacing: float, weft_spacing: float)
         k3=keys.k3_N_mm * area,
         dashpot=keys.dashpot_N_s_mm * area,
         alignment=keys.alignment_N_mm,
+        laws=tuple(law.build(area) for law in keys.laws),
     )
 
 

@@ -89,6 +89,7 @@ def build(case: DrapeCase, session: Session) -> Model:
     return Model(
         net,
         section(case.tow),
+        section_law=case.tow.section_law,
         crossovers=crossover_law(case.crossover, keys.warp_spacing_mm, keys.weft_spacing_mm),
         gravity=(0.0, 0.0, -case.gravity_mm_s2),
         inertia=GeneralisedAlpha(case.solver.spectral_radius),

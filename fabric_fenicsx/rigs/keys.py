@@ -13,7 +13,17 @@ from pydantic_core import PydanticUndefined
 
 from .cases import Case
 
-__all__ = ["CASES", "Key", "allowed", "documented", "group_of", "plain", "unit"]
+__all__ = [
+    "CASES",
+    "Key",
+    "allowed",
+    "documented",
+    "group_of",
+    "plain",
+    "unit",
+    "variant_of",
+    "variants",
+]
 
 CASES: dict[str, type[BaseModel]] = {
     get_args(model.model_fields["test"].annotation)[0]: model for model in get_args(Case)
@@ -75,9 +85,38 @@ def group_of(annotation: Any) -> type[BaseModel] | None:
     """The model of a group of keys, or of the entries of a list of groups; None for a value."""
     if get_origin(annotation) is list:
         return group_of(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, types.UnionType):
+        parts = [part for part in get_args(annotation) if part is not type(None)]
+        return group_of(parts[0]) if len(parts) == 1 else None
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return None
+
+
+def variant_of(annotation: Any, tag: str) -> type[BaseModel] | None:
+    """Of several groups that a key tells apart, the one with this value of it."""
+    while get_origin(annotation) is Annotated:
+        annotation = get_args(annotation)[0]
+    if get_origin(annotation) not in (Union, types.UnionType):
+        return None
+    for part in get_args(annotation):
+        if isinstance(part, type) and issubclass(part, BaseModel):
+            kinds = (field.annotation for field in part.model_fields.values())
+            if any(tag in get_args(kind) for kind in kinds if get_origin(kind) is Literal):
+                return part
+    return None
+
+
+def variants(annotation: Any) -> list[str]:
+    """The values of the key that tells groups apart."""
+    while get_origin(annotation) is Annotated:
+        annotation = get_args(annotation)[0]
+    names: list[str] = []
+    for part in get_args(annotation):
+        for field in part.model_fields.values():
+            if get_origin(field.annotation) is Literal:
+                names += get_args(field.annotation)
+    return names
 
 
 def allowed_by(field: FieldInfo) -> str:
@@ -94,8 +133,9 @@ def allowed(annotation: Any, metadata: Sequence[Any] = ()) -> str:
     if origin is Literal:
         return one_of([str(value) for value in arguments])
     if origin in (Union, types.UnionType):
-        parts = [allowed(part, metadata) for part in arguments if part is not type(None)]
-        return one_of([*parts, "null"])
+        words = [allowed(part, metadata) for part in arguments if part is not type(None)]
+        null = ["null"] if type(None) in arguments else []
+        return one_of([*dict.fromkeys(words), *null])
     if origin is list:
         return f"a list, each entry {allowed(arguments[0])}"
     if origin is dict:

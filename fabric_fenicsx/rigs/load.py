@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from ..errors import InputError
 from ..fabric.sheet import centred_sheet, spaced_sheet
 from .cases import CantileverCase, Case, DrapeCase, PictureFrameCase
-from .keys import CASES, allowed, allowed_by, group_of, one_of, plain
+from .keys import CASES, allowed, allowed_by, group_of, one_of, plain, variant_of, variants
 
 __all__ = ["load_case"]
 
@@ -171,6 +171,11 @@ def _explained(model: type[BaseModel], problem: dict[str, Any]) -> tuple[Place, 
     if kind == "invalid_key":
         place = tuple(part for part in place if part != "[key]")
         return place, f"{_dotted(place)}: a key that is no text, allowed is the name of a key"
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        name = problem["ctx"]["discriminator"].strip("'")
+        tags = variants(_annotation(model, place[:-1]))
+        found = plain(value.get(name)) if isinstance(value, dict) and name in value else "missing"
+        return place, f"{_dotted((*place, name))}: {found}, allowed is {one_of(tags)}"
     words, group = _resolve(model, place)
     if kind == "value_error" and group is not None:
         reason = str(problem["ctx"]["error"])
@@ -198,11 +203,23 @@ def _resolve(model: type[BaseModel], place: Place) -> tuple[str | None, type[Bas
             words = allowed_by(field)
         elif get_origin(annotation) is dict:
             return "text", None
+        elif (variant := variant_of(annotation, str(part))) is not None:
+            group, words = variant, None
+            continue
         else:
             return None, None
         whole = get_origin(annotation) is not list
         group = group_of(annotation) if whole else None
     return words, group
+
+
+def _annotation(model: type[BaseModel], place: Place) -> Any:
+    """The type of the entries of the list at a place of named groups."""
+    field = None
+    for part in place:
+        field = model.model_fields[str(part)]
+        model = group_of(field.annotation) or model
+    return get_args(field.annotation)[0] if field is not None else model
 
 
 def _booleans(model: type[BaseModel], data: Any, above: Place = ()) -> Iterator[tuple[Place, bool]]:

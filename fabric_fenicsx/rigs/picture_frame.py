@@ -97,6 +97,7 @@ def build(case: PictureFrameCase, session: Session) -> Model:
     return Model(
         net,
         section(case.tow),
+        section_law=case.tow.section_law,
         crossovers=crossover_law(case.crossover, case.warp_spacing_mm, case.weft_spacing_mm),
         viscosity=case.tow.relaxation_time_s,
         supports=[frame_ends(net, case)],

@@ -144,7 +144,7 @@ class Model:
                 beam.beam_residual(tows, self.law),
                 beam.beam_tangent(tows, self.law),
                 beam.strain_energy(tows, self.elastic.energy),
-                beam.viscous_loss(tows, self.relaxation),
+                beam.viscous_loss(tows, self.relaxation, self.elastic.at_zero),
             )
         ]
         if np.any(self._full_gravity):

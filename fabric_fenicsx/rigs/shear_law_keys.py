@@ -1,0 +1,123 @@
+"""Shear laws in a case file: one group of keys for each of mechanics.shear_laws.
+
+Moments are per area of fabric, as everywhere in a case; angles in degrees.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from ..mechanics import shear_laws
+
+__all__ = ["ShearLawKeys"]
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class Keys(BaseModel):
+    """A law: unknown keys are an error, numbers must be finite."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class TabulatedSpringKeys(Keys):
+    """Elastic moment through points, from (0, 0)."""
+
+    law: Literal["tabulated_spring"]
+    angles_deg: list[NotNegative] = Field(description="shear angles, increasing from 0")
+    moments_N_mm: list[NotNegative] = Field(description="moments per area there, not falling")
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> TabulatedSpringKeys:
+        self.build(1.0)
+        return self
+
+    def build(self, area: float) -> shear_laws.ShearLaw:
+        """The law of a crossing that stands for ``area`` [mm²]."""
+        angles = tuple(math.radians(angle) for angle in self.angles_deg)
+        return shear_laws.TabulatedSpring(angles, tuple(m * area for m in self.moments_N_mm))
+
+
+class PowerDashpotKeys(Keys):
+    """Moment that grows like a power of the rate."""
+
+    law: Literal["power_dashpot"]
+    c_N_mm: Positive = Field(description="moment per area at a rate of 1 rad/s")
+    power: Positive = Field(description="exponent of the rate; 1 is a linear dashpot")
+
+    def build(self, area: float) -> shear_laws.ShearLaw:
+        """The law of a crossing that stands for ``area`` [mm²]."""
+        return shear_laws.PowerDashpot(self.c_N_mm * area, self.power)
+
+
+class TabulatedDashpotKeys(Keys):
+    """Viscous moment through points of the rate, from (0, 0)."""
+
+    law: Literal["tabulated_dashpot"]
+    rates_rad_s: list[NotNegative] = Field(description="rates of shear, increasing from 0")
+    moments_N_mm: list[NotNegative] = Field(description="moments per area there, not falling")
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> TabulatedDashpotKeys:
+        self.build(1.0)
+        return self
+
+    def build(self, area: float) -> shear_laws.ShearLaw:
+        """The law of a crossing that stands for ``area`` [mm²]."""
+        moments = tuple(m * area for m in self.moments_N_mm)
+        return shear_laws.TabulatedDashpot(tuple(self.rates_rad_s), moments)
+
+
+class MaxwellKeys(Keys):
+    """Spring and dashpot in series: a moment that relaxes in a hold."""
+
+    law: Literal["maxwell"]
+    k_N_mm: Positive = Field(description="stiffness per area")
+    relaxation_time_s: Positive = Field(description="time in which the moment falls to 1/e")
+
+    def build(self, area: float) -> shear_laws.ShearLaw:
+        """The law of a crossing that stands for ``area`` [mm²]."""
+        return shear_laws.Maxwell(self.k_N_mm * area, self.relaxation_time_s)
+
+
+class FrictionKeys(Keys):
+    """Rate-independent moment against the direction of shearing."""
+
+    law: Literal["coulomb_friction", "dahl_friction"]
+    limit_N_mm: Positive = Field(description="largest moment per area")
+    stick_angle_deg: Positive = Field(0.5, description="limit over the stiffness of the stick")
+
+    def build(self, area: float) -> shear_laws.ShearLaw:
+        """The law of a crossing that stands for ``area`` [mm²]."""
+        limit = self.limit_N_mm * area
+        stiffness = limit / math.radians(self.stick_angle_deg)
+        if self.law == "coulomb_friction":
+            return shear_laws.CoulombFriction(limit, stiffness)
+        return shear_laws.DahlFriction(limit, stiffness)
+
+
+class LockingKeys(Keys):
+    """Tows that meet side by side: a steep moment beyond the locking angle."""
+
+    law: Literal["locking"]
+    angle_deg: Positive = Field(description="locking angle")
+    k_N_mm: Positive = Field(description="moment per area over the square of the angle beyond")
+
+    def build(self, area: float) -> shear_laws.ShearLaw:
+        """The law of a crossing that stands for ``area`` [mm²]."""
+        return shear_laws.Locking(math.radians(self.angle_deg), self.k_N_mm * area)
+
+
+ShearLawKeys = Annotated[
+    TabulatedSpringKeys
+    | PowerDashpotKeys
+    | TabulatedDashpotKeys
+    | MaxwellKeys
+    | FrictionKeys
+    | LockingKeys,
+    Field(discriminator="law"),
+]
