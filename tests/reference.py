@@ -3,7 +3,8 @@
 The published numbers stand in tests/data with table and row. The plane elasticas (inextensible,
 rigid in shear) are initial value problems in the angle θ [rad] between tangent and root direction,
 integrated from the free tip, where the curvature vanishes, to the clamp. The curved beam in space
-is shooting on the moment at its clamp, with rotation matrices.
+is shooting on the moment at its clamp, with rotation matrices. The Chebyshev net of the sphere is
+an initial value problem too.
 """
 
 from __future__ import annotations
@@ -136,3 +137,24 @@ def curved_cantilever(radius, angle, stiffness, force, steps: int = 4):
     last = end(moment, f)
     assert np.abs(last[12:]).max() < 1e-8 * scale
     return last[:3] - radius * np.array([1.0 - np.cos(angle), np.sin(angle), 0.0])
+
+
+def chebyshev_angle(xi):
+    """Angle ω between the tows [rad] of the Chebyshev net on a sphere from two great circles.
+
+    ξ ω″ + ω′ + sin ω = 0 with ω(0) = π/2, ω′(0) = −1 and ξ = u v/R² of the arc lengths u, v. At
+    ξ = 0 the equation's limit is 2 ω″ = −cos ω ω′ = 0.
+
+    Args:
+        xi: values of ξ >= 0 in any order.
+    """
+    xi = np.asarray(xi, dtype=float)
+
+    def rates(x, y):
+        return [y[1], -(y[1] + np.sin(y[0])) / x if x > 0.0 else 0.0]
+
+    ends = (0.0, max(float(xi.max()), 1e-9))
+    solution = solve_ivp(
+        rates, ends, [np.pi / 2.0, -1.0], "DOP853", dense_output=True, rtol=1e-11, atol=1e-12
+    )
+    return solution.sol(xi.ravel())[0].reshape(xi.shape)
