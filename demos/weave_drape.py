@@ -24,10 +24,10 @@ from fabric_fenicsx.output.pictures import draw_net
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session, control, crossover_law, section, tow_net
+from fabric_fenicsx.solving.generalised_alpha import GeneralisedAlpha
 from fabric_fenicsx.solving.model import Model
 from fabric_fenicsx.solving.record import prepare_folder
 from fabric_fenicsx.solving.simulation import simulate
-from fabric_fenicsx.solving.stepping import GeneralisedAlpha
 
 # %% [markdown]
 # The sheet of `demos/drape.yaml` with half as many tows. Each is as wide as two of those, so that

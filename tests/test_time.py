@@ -7,8 +7,9 @@ from scipy.linalg import eigh
 from solve import GivenSection, orders, random_rotation, set_loads
 
 from fabric_fenicsx.fabric.net import single_tow
+from fabric_fenicsx.solving.generalised_alpha import GeneralisedAlpha
 from fabric_fenicsx.solving.model import Model, Support
-from fabric_fenicsx.solving.stepping import GeneralisedAlpha, StepControl, Stepper
+from fabric_fenicsx.solving.stepping import StepControl, Stepper
 
 CLAMPED = (0, 1, 2, 3, 4, 5)
 RADII = [0.0, 0.3, 0.5, 0.8, 1.0]

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from .shear_law_keys import ShearLawKeys
-from .weave_keys import WeaveKeys
+from .weave_keys import SheetKeys, WeaveKeys
 
 __all__ = [
     "Assumptions",
@@ -70,18 +70,6 @@ class CrossoverKeys(Keys):
         default_factory=list,
         description="further in-plane moments: tabulated_spring, power_dashpot, tabulated_dashpot, "
         "maxwell, coulomb_friction, dahl_friction, locking",
-    )
-
-
-class SheetKeys(Keys):
-    """The sheet and its virtual tows; warp runs along y, weft along x."""
-
-    width_mm: Positive = Field(288.0, description="along x")
-    length_mm: Positive = Field(288.0, description="along y")
-    warp_spacing_mm: Positive = Field(12.0, description="distance between warp tows")
-    weft_spacing_mm: Positive = Field(12.0, description="distance between weft tows")
-    subdivisions: Annotated[int, Field(ge=1, le=64)] = Field(
-        2, description="cells of a tow between two crossings"
     )
 
 

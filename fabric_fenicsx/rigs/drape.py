@@ -19,10 +19,10 @@ from ..fabric.sheet import Sheet, centred_sheet
 from ..mechanics.tools import HoledPlate, Sphere, Tool
 from ..output.pictures import RevolvedSurface, draw_net
 from ..output.snapshot import Snapshot
+from ..solving.generalised_alpha import GeneralisedAlpha
 from ..solving.model import Model, Support
 from ..solving.parts import ContactLaw
 from ..solving.simulation import Run, simulate
-from ..solving.stepping import GeneralisedAlpha
 from .cases import ContactKeys, DrapeCase
 from .common import Session, control, crossover_law, extend, lowest, section, tow_net, write_table
 from .weave_keys import crossing_weights, layout

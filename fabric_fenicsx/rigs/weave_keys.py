@@ -1,9 +1,9 @@
-"""The weave of a case: its keys, and what the rigs make of them."""
+"""Sheet and weave of a case: their keys, and what the rigs make of them."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,14 +16,25 @@ from ..fabric.net import Net
 from ..fabric.outline import Circle, Outline, Polygon, rectangle
 from ..fabric.weave import WEAVES, WeavePattern, pattern_from_file
 
-if TYPE_CHECKING:
-    from .cases import SheetKeys
-
-__all__ = ["WeaveKeys", "crossing_weights", "layout", "pattern"]
+__all__ = ["SheetKeys", "WeaveKeys", "crossing_weights", "layout", "pattern"]
 
 Positive = Annotated[float, Field(gt=0.0)]
 Binary = Annotated[int, Field(ge=0, le=1)]
 Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
+
+
+class SheetKeys(BaseModel):
+    """The sheet and its virtual tows; warp runs along y, weft along x."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    width_mm: Positive = Field(288.0, description="along x")
+    length_mm: Positive = Field(288.0, description="along y")
+    warp_spacing_mm: Positive = Field(12.0, description="distance between warp tows")
+    weft_spacing_mm: Positive = Field(12.0, description="distance between weft tows")
+    subdivisions: Annotated[int, Field(ge=1, le=64)] = Field(
+        2, description="cells of a tow between two crossings"
+    )
 
 
 class WeaveKeys(BaseModel):
