@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ufl import conditional, diff, dot, lt, max_value, min_value, sqrt, variable
+from ufl import as_vector, conditional, diff, dot, lt, max_value, min_value, sqrt, variable
 
 from .fields import TowFields, translation_part
 
@@ -21,6 +21,7 @@ __all__ = [
     "friction_traction",
     "plate_with_hole",
     "pressure",
+    "sampled_distance",
     "sphere",
     "traction_loss",
     "traction_work",
@@ -101,6 +102,21 @@ def sphere(x: Any, centre: Any, radius: Any) -> Any:
     """Signed distance from a sphere: positive outside."""
     r = x - centre
     return root(r[0] ** 2 + r[1] ** 2 + r[2] ** 2) - radius
+
+
+def sampled_distance(x: Any, sample: Any) -> Any:
+    """Distance about the place y at which a tool was sampled, d + n·(x − y) + (x − y)·H·(x − y)/2.
+
+    ``sample`` has thirteen components: d, n (3), H (xx, xy, xz, yy, yz, zz) and y (3), one set for
+    each node. At x = y value, gradient and second derivatives are those of the tool.
+    """
+    r = x - as_vector([sample[10 + i] for i in range(3)])
+    linear = sum(sample[1 + i] * r[i] for i in range(3))
+    pairs = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+    square = sum(
+        (0.5 if i == j else 1.0) * sample[4 + k] * r[i] * r[j] for k, (i, j) in enumerate(pairs)
+    )
+    return sample[0] + linear + square
 
 
 def plate_with_hole(x: Any, centre: Any, hole_radius: Any, edge_radius: Any, side: Any) -> Any:

@@ -20,7 +20,7 @@ from vtkmodules.vtkCommonCore import vtkLogger
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.snapshot import Snapshot
 
-__all__ = ["COLOURS", "VIEWS", "RevolvedSurface", "draw_net"]
+__all__ = ["COLOURS", "VIEWS", "RevolvedSurface", "TriangleSurface", "draw_net"]
 
 Array = npt.NDArray[np.float64]
 
@@ -55,6 +55,39 @@ class RevolvedSurface:
             raise ValueError(f"surface {self.name}: centre has shape {shape}, not (3,)")
         if np.min(self.profile[:, 0]) < 0.0:
             raise ValueError(f"surface {self.name}: profile has a negative radius")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TriangleSurface:
+    """A tool of any shape, as triangles.
+
+    Attributes:
+        name: what the tool is called.
+        points: corners relative to the tool's place [mm], shape (n, 3).
+        cells: three points of each triangle, shape (m, 3).
+        place: where the tool is [mm], shape (3,).
+        colour: any colour that matplotlib knows.
+        opacity: from 0 (invisible) to 1.
+
+    Raises:
+        ValueError: the points, the triangles or the place have another shape.
+    """
+
+    name: str
+    points: npt.NDArray[np.float64]
+    cells: npt.NDArray[np.int64]
+    place: npt.NDArray[np.float64]
+    colour: str = "#9fb0c3"
+    opacity: float = 0.35
+
+    def __post_init__(self) -> None:
+        for what, value in (("points", self.points), ("cells", self.cells)):
+            shape = np.shape(value)
+            if len(shape) != 2 or shape[0] < 1 or shape[1] != 3:
+                raise ValueError(f"surface {self.name}: {what} has shape {shape}, not (n >= 1, 3)")
+        if np.shape(self.place) != (3,):
+            shape = np.shape(self.place)
+            raise ValueError(f"surface {self.name}: place has shape {shape}, not (3,)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +150,7 @@ def draw_net(
     net: Net,
     snapshot: Snapshot,
     *,
-    surfaces: Sequence[RevolvedSurface] = (),
+    surfaces: Sequence[RevolvedSurface | TriangleSurface] = (),
     view: str = "perspective",
     colour: str = "shear_angle",
     limits: tuple[float, float] | None = None,
@@ -166,7 +199,7 @@ def draw_net(
     step = _step(limits[1] - limits[0])
     diverging = quantity.signed and limits[0] < 0.0 < limits[1]
     tubes = _tubes(lines, radius if radius is not None else 0.12 * _spacing(net))
-    tools = [(_revolved(surface), surface) for surface in surfaces]
+    tools = [(_surface(surface), surface) for surface in surfaces]
 
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -316,6 +349,14 @@ def _tubes(lines: list[_Line], radius: float) -> pv.PolyData:
     curves = pv.PolyData(np.concatenate(points), lines=np.concatenate(polylines))
     curves["values"] = np.concatenate(values)
     return curves.tube(radius=radius, n_sides=SIDES, capping=True)
+
+
+def _surface(surface: RevolvedSurface | TriangleSurface) -> pv.PolyData:
+    """The surface as a mesh of triangles in its place."""
+    if isinstance(surface, RevolvedSurface):
+        return _revolved(surface)
+    faces = np.insert(surface.cells, 0, 3, axis=1).ravel()
+    return pv.PolyData(np.asarray(surface.points, dtype=np.float64) + surface.place, faces=faces)
 
 
 def _revolved(surface: RevolvedSurface, pieces: int = 180) -> pv.PolyData:

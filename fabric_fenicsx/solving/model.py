@@ -22,11 +22,11 @@ from ..mechanics.terms import Term, work_term
 from ..mechanics.tools import Tool
 from ..output.snapshot import Snapshot
 from .discretisation import BLOCK, Discretisation
+from .generalised_alpha import GeneralisedAlpha
 from .history import Histories
 from .newton import Newton
 from .parts import ContactLaw, Contacts, Crossings, CrossoverLaw
 from .sections import SectionLawName, diagonals, elastic_section
-from .stepping import GeneralisedAlpha
 from .system import System
 from .update import rotate
 
@@ -125,6 +125,9 @@ class Model:
         if extra is not None:
             terms += list(extra(self.fields, self.disc.connectors))
         self.system = System(self.disc, terms, law=self.law)
+        if self.contacts is not None:
+            self.system.refresh.append(self.contacts.refresh)
+            self.contacts.refresh()
         self._number(supports)
 
     def _constants(self, mass_scale: float) -> None:

@@ -14,8 +14,8 @@ from .. import _dolfinx
 from ..mechanics import contact, crossover
 from ..mechanics.shear_laws import Crossing, LinearDashpot, PolynomialSpring, ShearLaw
 from ..mechanics.terms import Term, energy_term, work_term
-from ..mechanics.tools import Tool
-from .discretisation import Discretisation
+from ..mechanics.tools import SampledTool, Tool
+from .discretisation import BLOCK, Discretisation
 from .history import Histories
 
 __all__ = ["ContactLaw", "Contacts", "Crossings", "CrossoverLaw"]
@@ -187,6 +187,8 @@ class Contacts:
         self.frictional = law.friction > 0.0
         self._places: list[Any] = []
         self._shifts: list[Any] = []
+        self._samples: list[tuple[SampledTool, Any, Function]] = []
+        self._disc = disc
         tows = disc.tows
 
         def number(value: Any) -> Any:
@@ -198,6 +200,9 @@ class Contacts:
             place = number(tuple(tool.path(0.0)))
             shift = number((0.0, 0.0, 0.0))
             numbers = {key: number(value) for key, value in tool.numbers().items()}
+            if isinstance(tool, SampledTool):
+                numbers["sample"] = Function(_dolfinx.lagrange(tows.mesh, 13))
+                self._samples.append((tool, place, numbers["sample"]))
             self._places.append(place)
             self._shifts.append(shift)
 
@@ -217,6 +222,20 @@ class Contacts:
                 loss = contact.traction_loss(tows, traction, shift)
                 self.terms.append(work_term(f"{tool.name} friction", tows, work, loss=loss))
                 histories.add(f"{tool.name}: traction", "nodes", traction_n, traction)
+
+    def refresh(self) -> None:
+        """Sample the tools that are not analytic at the nodes' places, ghosts included."""
+        if not self._samples:
+            return
+        disc, tows = self._disc, self._disc.tows
+        moved = tows.u_n.x.array.reshape(-1, 3) + tows.w.x.array.reshape(-1, BLOCK)[:, :3]
+        x = disc.net.points[disc.local_nodes] + moved
+        upper = np.triu_indices(3)
+        for tool, place, field in self._samples:
+            d, n, H = tool.sample(x - place.value)
+            values = field.x.array.reshape(-1, 13)
+            values[:, 0], values[:, 1:4], values[:, 4:10] = d, n, H[:, upper[0], upper[1]]
+            values[:, 10:] = x
 
     def set_time(self, start: float, end: float) -> None:
         """Move the tools to their places at the end of the step."""

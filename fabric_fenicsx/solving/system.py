@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Any
 
@@ -34,6 +34,8 @@ class System:
     Attributes:
         nodal_loads: dead forces and material moments on each local block, (n_blocks, 6)
             [N, N mm]; ghosts are ignored.
+        refresh: called after each new increment, for coefficients that depend on it otherwise than
+            through UFL.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class System:
             linearised_forces(tows, self._dw, net.forces_space, law), comm
         )
         self.nodal_loads = np.zeros((len(net.local_nodes), BLOCK))
+        self.refresh: list[Callable[[], None]] = []
         self.assemble_seconds = 0.0
         self._local = np.zeros(len(net.rows))
         self._lg_tows, self._lg_crossovers = net.maps()
@@ -113,6 +116,8 @@ class System:
         self._to_connectors.scatter(x, self._connector_values)
         if net.connectors is not None:
             net.connectors.w.x.array[:] = self._connector_values.array_r
+        for refresh in self.refresh:
+            refresh()
 
     def residual(self, F: PETSc.Vec) -> None:
         """Assemble the residual at the increment set last."""

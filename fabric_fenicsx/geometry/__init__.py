@@ -1,0 +1,1 @@
+"""Shapes of tools from files: triangulated surfaces and their distance on a grid; no UFL here."""
