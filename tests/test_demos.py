@@ -48,3 +48,16 @@ def test_drape_starts(tmp_path):
     assert numbers["depth_mm"] == pytest.approx(5.5 * 65.0 / 60.0)
     assert 0.0 < numbers["largest_shear_deg"] < 15.0
     assert (tmp_path / "drape.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("shape", ["double_dome", "box"])
+def test_double_dome_starts(tmp_path, shape):
+    """The first 4 mm of the draw: the sheet follows the punch, which dents it by the layer at most.
+
+    A sheet this thin hardly weighs: where it rides on the punch it is not deeper than 0.5 mm in it.
+    """
+    numbers = demo("double_dome").main(tmp_path, duration=5.0, shape=shape)
+    assert numbers["punch_mm"] == pytest.approx(5.0 * 46.0 / 60.0)
+    assert -0.5 < numbers["sheet_mm"] - numbers["punch_mm"] < 3.0
+    assert 0.0 < numbers["largest_shear_deg"] < 15.0
+    assert (tmp_path / f"{shape}.png").stat().st_size > 10_000

@@ -1,6 +1,7 @@
 """Tools from STL files against the analytic sphere: distance, contact and a small drape."""
 
 from functools import cache
+from pathlib import Path
 
 from mpi4py import MPI
 
@@ -16,6 +17,7 @@ from fabric_fenicsx.mechanics.tools import Mould, Sphere
 from fabric_fenicsx.solving.model import Model, Support
 from fabric_fenicsx.solving.parts import ContactLaw, CrossoverLaw
 
+MESHES = Path(__file__).parents[1] / "meshes"
 RADIUS = 30.0
 SECTION = GivenSection((4000.0, 1500.0, 1500.0, 60.0, 50.0, 900.0))
 CROSSOVERS = CrossoverLaw(translation=100.0, k1=5.0, k3=2.0, dashpot=0.0, alignment=100.0)
@@ -110,6 +112,26 @@ def test_an_open_sheet_has_the_side_of_its_normals():
     assert n[:, 2] == pytest.approx([up, up], abs=1e-6)
     reverse = DistanceGrid.of(sheet.reversed(), 1.0, 4.0)
     assert reverse.evaluate(x)[0] == pytest.approx(-up * x[:, 2], abs=1e-6)
+
+
+def test_turned_over():
+    """A mirrored plate is the plate at mirrored points."""
+    plate = Mould.from_stl("holder", punch_path, MESHES / "box_plate.stl", cell=5.0)
+    die = plate.turned_over("die", punch_path)
+    x = np.random.default_rng(1).uniform([-150.0, -150.0, -30.0], [150.0, 150.0, 30.0], (50, 3))
+    mirror = np.array([1.0, 1.0, -1.0])
+    (d, n, H), (e, m, G) = plate.sample(x), die.sample(x * mirror)
+    np.testing.assert_allclose(e, d, atol=1e-9)
+    np.testing.assert_allclose(m, n * mirror, atol=1e-9)
+    np.testing.assert_allclose(G, H * mirror * mirror[:, None], atol=1e-9)
+    assert die.surface.volume == pytest.approx(plate.surface.volume) and die.surface.volume > 0.0
+
+
+@pytest.mark.parametrize("path", sorted(MESHES.glob("*.stl")), ids=lambda path: path.name)
+def test_moulds_of_the_demos(path):
+    surface = read_stl(path)
+    assert surface.closed and surface.volume > 0.0
+    assert path.stat().st_size < 300_000
 
 
 # Contact ------------------------------------------------------------------------------------------

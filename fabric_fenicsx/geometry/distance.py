@@ -96,6 +96,12 @@ class DistanceGrid:
         last = np.array(self.coefficients.shape) - 1
         return self.origin + BORDER * self.cell, self.origin + (last - BORDER) * self.cell
 
+    def turned_over(self) -> DistanceGrid:
+        """Its mirror image in z = 0."""
+        top = self.origin[2] + (self.coefficients.shape[2] - 1) * self.cell
+        origin = np.array([self.origin[0], self.origin[1], -top])
+        return DistanceGrid(origin, self.cell, self.coefficients[:, :, ::-1])
+
     def evaluate(self, x: Array) -> tuple[Array, Array, Array]:
         """Distance, gradient and second derivatives at points.
 

@@ -58,6 +58,29 @@ class Triangles:
         if len(np.unique(ways, axis=0)) < len(ways):
             raise ValueError("neighbouring triangles are oriented against each other")
 
+    @classmethod
+    def from_corners(cls, corners: Array) -> Triangles:
+        """The surface of separate triangles, (m, 3, 3) [mm]: equal corners become one point.
+
+        Triangles without an area are left out.
+
+        Raises:
+            ValueError: as above.
+        """
+        if len(corners) == 0:
+            raise ValueError("the surface has no triangles")
+        flat = corners.reshape(-1, 3)
+        raster = MERGING * max(float(np.ptp(flat, axis=0).max()), 1e-300)
+        _, first, place = np.unique(
+            np.round((flat - flat.min(axis=0)) / raster),
+            axis=0,
+            return_index=True,
+            return_inverse=True,
+        )
+        cells = place.reshape(-1, 3).astype(np.int64)
+        a, b, c = cells.T
+        return cls(flat[first], cells[(a != b) & (b != c) & (c != a)])
+
     def _directed_edges(self) -> npt.NDArray[np.int64]:
         return np.concatenate([self.cells[:, [0, 1]], self.cells[:, [1, 2]], self.cells[:, [2, 0]]])
 
@@ -104,7 +127,7 @@ def read_stl(path: str | Path) -> Triangles:
     if not np.isfinite(corners).all():
         raise InputError(f"{path}: a coordinate is not finite")
     try:
-        return _merged(corners)
+        return Triangles.from_corners(corners)
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -144,17 +167,3 @@ def _ascii(content: bytes) -> Array | None:
         return np.array(corners, dtype=np.float64).reshape(-1, 3, 3)
     except ValueError:
         return None
-
-
-def _merged(corners: Array) -> Triangles:
-    """The surface of separate triangles; those without an area are left out."""
-    if len(corners) == 0:
-        raise ValueError("the surface has no triangles")
-    flat = corners.reshape(-1, 3)
-    raster = MERGING * max(float(np.ptp(flat, axis=0).max()), 1e-300)
-    _, first, place = np.unique(
-        np.round((flat - flat.min(axis=0)) / raster), axis=0, return_index=True, return_inverse=True
-    )
-    cells = place.reshape(-1, 3).astype(np.int64)
-    a, b, c = cells.T
-    return Triangles(flat[first], cells[(a != b) & (b != c) & (c != a)])

@@ -169,6 +169,12 @@ class Mould:
         surface = read_stl(file)
         return cls(name, path, surface, DistanceGrid.of(surface, cell, margin))
 
+    def turned_over(self, name: str, path: Path) -> Mould:
+        """Its mirror image in z = 0: a die from a holder."""
+        points = self.surface.points * [1.0, 1.0, -1.0]
+        surface = Triangles(points, self.surface.cells[:, ::-1])
+        return Mould(name, path, surface, self.grid.turned_over())
+
     def numbers(self) -> dict[str, float]:
         """None: the shape is in the samples."""
         return {}
