@@ -42,7 +42,9 @@ def tow_numbers(net: Net) -> Integers:
 def _counted(before: Integers, after: Integers, size: int) -> Integers:
     """Numbers that rise by one in most of the given pairs, from 0 in each connected part."""
     shape = (size, size)
-    votes = coo_array((np.ones(len(before)), (before, after)), shape=shape).tocsr()
+    # scipy's graph routines take 32-bit indices only, and from 1.15 on coo_array keeps 64-bit ones.
+    pairs = (before.astype(np.int32), after.astype(np.int32))
+    votes = coo_array((np.ones(len(before)), pairs), shape=shape).tocsr()
     # The steps on which most tows agree: where the sheet has holes, some skip a tow.
     tree = minimum_spanning_tree(-(votes + votes.T))
     parts, part = connected_components(tree, directed=False)
