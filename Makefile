@@ -32,7 +32,7 @@ export PYTHONNOUSERSITE := 1
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 
 .DEFAULT_GOAL := help
-.PHONY: help setup drape test test-slow check image clean
+.PHONY: help setup drape test test-slow check reference image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 12
@@ -63,6 +63,9 @@ check: setup ## lint, formatting and types
 	$(VENV)/ruff check .
 	$(VENV)/ruff format --check .
 	$(VENV)/mypy
+
+reference: setup ## compute the table of verified numbers anew, docs/reference.md
+	$(VENV)/python scripts/reference_page.py
 
 image: ## build the container image fabric-fenicsx
 	$(DOCKER) build -t fabric-fenicsx .

@@ -232,8 +232,8 @@ def test_these_ranks_find_what_one_rank_finds():
         np.testing.assert_allclose(some, other, atol=1e-9)
 
 
-@pytest.mark.skipif(not MPIRUN.exists(), reason="needs /usr/bin/mpirun")
-def test_one_two_and_three_ranks_find_the_same():
+def on_that_many(ranks):
+    """What on_ranks prints when mpirun starts it."""
     environment = os.environ | {
         "OMPI_ALLOW_RUN_AS_ROOT": "1",
         "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
@@ -244,14 +244,17 @@ def test_one_two_and_three_ranks_find_the_same():
         "PYTHONHASHSEED": "0",
     }
     script = Path(__file__).with_name("on_ranks.py")
-    found = []
-    for ranks in (1, 2, 3):
-        command = [str(MPIRUN), "-n", str(ranks), sys.executable, "-m", "mpi4py", str(script)]
-        done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=120, check=False
-        )
-        assert done.returncode == 0, done.stderr
-        found.append(json.loads(done.stdout.splitlines()[-1]))
+    command = [str(MPIRUN), "-n", str(ranks), sys.executable, "-m", "mpi4py", str(script)]
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.skipif(not MPIRUN.exists(), reason="needs /usr/bin/mpirun")
+def test_one_two_and_three_ranks_find_the_same():
+    found = [on_that_many(ranks) for ranks in (1, 2, 3)]
     one = found[0]
     assert [f["ranks"] for f in found] == [1, 2, 3]
     for other in found[1:]:
