@@ -18,14 +18,12 @@ from mpi4py import MPI
 
 import numpy as np
 
-from fabric_fenicsx.fabric.crossings import crossing_numbers
 from fabric_fenicsx.fabric.weave import WEAVES
 from fabric_fenicsx.output.pictures import draw_net
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.cases import DrapeCase
-from fabric_fenicsx.rigs.common import Session, control, crossover_law, section, tow_net
-from fabric_fenicsx.solving.generalised_alpha import GeneralisedAlpha
-from fabric_fenicsx.solving.model import Model
+from fabric_fenicsx.rigs.common import Session, control
+from fabric_fenicsx.rigs.weave_keys import WeaveKeys
 from fabric_fenicsx.solving.record import prepare_folder
 from fabric_fenicsx.solving.simulation import simulate
 
@@ -57,35 +55,22 @@ def main(folder: Path = Path("results/weave_drape"), duration: float = 60.0) -> 
         own = folder / name
         prepare_folder(own, comm)
         session = Session(own, comm, Path(), perf_counter())
-        net = tow_net(CASE, drape.flat_sheet(CASE), session)
-        weave = WEAVES[name]
-        model = Model(
-            net,
-            section(CASE.tow),
-            crossovers=crossover_law(CASE.crossover, 24.0, 24.0),
-            gravity=(0.0, 0.0, -CASE.gravity_mm_s2),
-            inertia=GeneralisedAlpha(CASE.solver.spectral_radius),
-            viscosity=CASE.tow.relaxation_time_s,
-            tools=drape.tools(CASE),
-            contact_law=drape.contact_law(CASE.contact),
-            supports=drape.symmetry_planes(net),
-            interlacing=weave.interlacing(*crossing_numbers(net)),
-            comm=comm,
-        )
+        case = CASE.model_copy(update={"weave": WeaveKeys(pattern=name)})
+        model = drape.build(case, session)
         run = simulate(
             model,
             own,
             test="drape",
             end=duration,
-            control=control(CASE.solver),
-            force_tolerance=CASE.solver.force_tolerance_N,
+            control=control(case.solver, case.edge_radius_mm / 2.0),
+            force_tolerance=case.solver.force_tolerance_N,
         )
         if run.last is None or run.last.time < duration:
             raise SystemExit(f"{name}: {run.stop}")
         shear = np.abs(run.last.shear_angle)
         row = run.rows[-1]
         numbers[name] = {
-            "mean_float": weave.float_length[0],
+            "mean_float": WEAVES[name].float_length[0],
             "largest_shear_deg": float(np.degrees(shear.max())),
             "mean_shear_deg": float(np.degrees(shear.mean())),
             "punch_force_N": -4.0 * row["punch_force_z_N"],
@@ -94,7 +79,7 @@ def main(folder: Path = Path("results/weave_drape"), duration: float = 60.0) -> 
         if comm.rank == 0:
             draw_net(
                 own / "drape.png",
-                net,
+                model.net,
                 run.last,
                 mirror=True,
                 title=name.replace("_", " "),
