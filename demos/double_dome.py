@@ -1,9 +1,9 @@
 # %% [markdown]
 # # Draping a plain weave over a double dome
 #
-# Tools of any shape come from STL files: here a punch of two domes and a plate with its outline as a
-# hole, used as the holder below the sheet and, turned over, as the die above it. The punch rises from
-# below. `meshes/make_moulds.py` writes the files.
+# Tools of any shape come from STL files: here a punch of two domes and a plate with its outline as
+# a hole, used as the holder below the sheet and, turned over, as the die above it. The punch rises
+# from below. `meshes/make_moulds.py` writes the files.
 #
 # ```
 # python demos/double_dome.py      # or: mpirun -n 2 python demos/double_dome.py
@@ -50,8 +50,8 @@ CROSSINGS = CrossoverLaw(
 # %% [markdown]
 # ## The tools
 #
-# A mould's distance is sampled once on a grid, whose cell is the finest detail it can show. The punch
-# rises 46 mm in 60 s; the holder closes the gap to the die in the first 6 s.
+# A mould's distance is sampled once on a grid, whose cell is the finest detail it can show. The
+# punch rises 46 mm in 60 s; the holder closes the gap to the die in the first 6 s.
 
 # %%
 SIZES = {"double_dome": (288.0, 216.0), "box": (240.0, 240.0)}  # of the sheet, along x and y

@@ -14,6 +14,8 @@ from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.geometry.distance import DistanceGrid, exact_distance
 from fabric_fenicsx.geometry.triangles import Triangles, read_stl, write_stl
 from fabric_fenicsx.mechanics.tools import Mould, Sphere
+from fabric_fenicsx.rigs.cases import DrapeCase
+from fabric_fenicsx.rigs.drape import tools
 from fabric_fenicsx.solving.model import Model, Support
 from fabric_fenicsx.solving.parts import ContactLaw, CrossoverLaw
 
@@ -298,3 +300,16 @@ def test_missing_file():
     with pytest.raises(InputError, match=r"nowhere\.stl: cannot be read") as error:
         read_stl("nowhere.stl")
     assert "\n" not in str(error.value)
+
+
+def test_punch_of_a_case(tmp_path):
+    """A case's STL counts from its folder; its lowest point meets the sheet at the start."""
+    write_stl(tmp_path / "ball.stl", ball(2))
+    case = DrapeCase(test="drape", punch_stl="ball.stl", punch_cell_mm=4.0, punch_travel_mm=90.0)
+    punch = tools(case, tmp_path)[0]
+    assert isinstance(punch, Mould) and punch.grid.cell == 4.0
+    lowest = punch.surface.points[:, 2].min()
+    assert punch.path(0.0)[2] + lowest == pytest.approx(0.0, abs=1e-9)
+    assert punch.path(case.duration_s)[2] + lowest == pytest.approx(-90.0)
+    with pytest.raises(InputError, match=r"none\.stl: cannot be read"):
+        tools(case.model_copy(update={"punch_stl": "none.stl"}), tmp_path)

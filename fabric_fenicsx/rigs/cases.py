@@ -163,6 +163,14 @@ class DrapeCase(Common):
         "quarter", description="model x >= 0, y >= 0 only, or the whole sheet"
     )
     punch_radius_mm: Positive = Field(76.2, description="radius of the hemisphere")
+    punch_stl: str | None = Field(
+        None,
+        description="a punch of another shape: STL file in mm, its axis x = y = 0, pressing "
+        "downwards with its lowest point first",
+    )
+    punch_cell_mm: Positive = Field(
+        1.0, description="grid of the distance from that punch; its edges are rounded over a cell"
+    )
     hole_radius_mm: Positive = Field(80.0, description="of die and holder")
     edge_radius_mm: Positive = Field(10.0, description="rounding of the holes' edges")
     punch_travel_mm: Positive = Field(65.0, description="depth of the draw")
@@ -183,7 +191,8 @@ class DrapeCase(Common):
     def _punch_fits(self) -> DrapeCase:
         if self.symmetry == "quarter" and (self.punch_offset_x_mm or self.punch_offset_y_mm):
             raise ValueError("punch_offset_x_mm, punch_offset_y_mm: need symmetry: none")
-        if self.punch_travel_mm > self.punch_radius_mm + self.edge_radius_mm:
+        too_deep = self.punch_travel_mm > self.punch_radius_mm + self.edge_radius_mm
+        if self.punch_stl is None and too_deep:
             raise ValueError(
                 "punch_travel_mm: at most punch_radius_mm + edge_radius_mm, "
                 "the punch is a hemisphere without a shank"

@@ -6,6 +6,7 @@ the punch presses the sheet through the hole. Tools are frictionless: the paper 
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,10 @@ from ..fabric.crossings import reference_angle
 from ..fabric.layout import TowLayout
 from ..fabric.net import Net
 from ..fabric.sheet import Sheet, centred_sheet
-from ..mechanics.tools import HoledPlate, Sphere, Tool
-from ..output.pictures import RevolvedSurface, draw_net
+from ..geometry.distance import DistanceGrid
+from ..geometry.triangles import read_stl
+from ..mechanics.tools import HoledPlate, Mould, Sphere, Tool
+from ..output.pictures import RevolvedSurface, TriangleSurface, draw_net
 from ..output.snapshot import Snapshot
 from ..solving.generalised_alpha import GeneralisedAlpha
 from ..solving.model import Model, Support
@@ -45,21 +48,34 @@ def flat_sheet(case: DrapeCase, session: Session) -> Sheet | TowLayout:
     )
 
 
-def tools(case: DrapeCase) -> list[Tool]:
-    """Punch, die and holder with their motions."""
+def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
+    """Punch, die and holder with their motions.
+
+    Args:
+        case: the case.
+        base: folder that the path of the punch's file counts from.
+
+    Raises:
+        InputError: the file of the punch cannot be read or is no surface with two sides.
+    """
+    shape = None if case.punch_stl is None else read_stl(base / case.punch_stl)
+    top = case.punch_radius_mm if shape is None else -float(shape.points[:, 2].min())
     speed = case.punch_travel_mm / case.duration_s
     x, y = case.punch_offset_x_mm, case.punch_offset_y_mm
     closing = case.holder_gap_mm - case.holder_gap_start_mm
 
     def punch(time: float) -> tuple[float, float, float]:
-        return x, y, case.punch_radius_mm - speed * time
+        return x, y, top - speed * time
 
     def holder(time: float) -> tuple[float, float, float]:
         return x, y, case.holder_gap_start_mm + closing * min(time / case.holder_closing_s, 1.0)
 
     hole, edge = case.hole_radius_mm, case.edge_radius_mm
+    cell = case.punch_cell_mm
     return [
-        Sphere("punch", punch, case.punch_radius_mm),
+        Sphere("punch", punch, case.punch_radius_mm)
+        if shape is None
+        else Mould("punch", punch, shape, DistanceGrid.of(shape, cell, 3.0 * cell)),
         HoledPlate("die", lambda time: (x, y, 0.0), hole, edge, 1.0),
         HoledPlate("holder", holder, hole, edge, -1.0),
     ]
@@ -95,7 +111,7 @@ def build(case: DrapeCase, session: Session) -> Model:
         inertia=GeneralisedAlpha(case.solver.spectral_radius),
         mass_scale=case.solver.mass_scale,
         viscosity=case.tow.relaxation_time_s,
-        tools=tools(case),
+        tools=tools(case, session.base),
         contact_law=contact_law(case.contact),
         supports=symmetry_planes(net) if case.symmetry == "quarter" else (),
         interlacing=None if weave is None else crossing_weights(weave, keys, net, session.base),
@@ -205,15 +221,7 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
 def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -> None:
     extent = 0.62 * max(case.sheet.width_mm, case.sheet.length_mm)
     colours = {"punch": "#8aa0b8", "die": "#b8a58a", "holder": "#cfd6dd"}
-    surfaces = [
-        RevolvedSurface(
-            tool.name,
-            tool.profile(extent),
-            np.asarray(tool.path(snapshot.time)),
-            colours[tool.name],
-        )
-        for tool in model.tools
-    ]
+    surfaces = [_surface(tool, extent, snapshot.time, colours[tool.name]) for tool in model.tools]
     depth = case.punch_travel_mm * snapshot.time / case.duration_s
     for view, shown in (
         ("perspective", [s for s in surfaces if s.name != "holder"]),
@@ -228,3 +236,12 @@ def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -
             title=f"punch at {depth:.0f} mm",
             mirror=case.symmetry == "quarter",
         )
+
+
+def _surface(
+    tool: Tool, extent: float, time: float, colour: str
+) -> RevolvedSurface | TriangleSurface:
+    place = np.asarray(tool.path(time))
+    if isinstance(tool, Mould):
+        return TriangleSurface(tool.name, tool.surface.points, tool.surface.cells, place, colour)
+    return RevolvedSurface(tool.name, tool.profile(extent), place, colour)
