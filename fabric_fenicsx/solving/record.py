@@ -192,4 +192,3 @@ class _replacing:
             os.replace(self.partial, self.path)
         else:
             self.partial.unlink(missing_ok=True)
-
