@@ -19,7 +19,7 @@ from ..solving.model import Model, Support
 from ..solving.simulation import Run, simulate
 from ..solving.stepping import StepControl
 from .cases import CantileverCase
-from .common import Session, crossover_law, section, tow_net, write_table
+from .common import Session, crossover_law, extend, section, tow_net, write_table
 
 __all__ = ["build", "midline", "run", "strip"]
 
@@ -97,7 +97,7 @@ def run(case: CantileverCase, session: Session) -> dict[str, Any]:
     write_table(session, "shape.csv", joined)
     if session.root and session.pictures and specimens:
         _draw(session, joined)
-    return {**totals, "quantities": {"specimens": specimens}}
+    return extend(totals, {"specimens": specimens}, session)
 
 
 def _hang(

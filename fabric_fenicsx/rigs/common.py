@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 from mpi4py import MPI
@@ -22,7 +23,6 @@ from ..fabric.net import Net
 from ..fabric.section import RectangularSection
 from ..fabric.sheet import Sheet
 from ..solving.parts import CrossoverLaw
-from ..solving.simulation import Run
 from ..solving.stepping import StepControl
 from .cases import Common, CrossoverKeys, SolverKeys, TowKeys
 
@@ -141,9 +141,12 @@ def write_table(session: Session, name: str, columns: dict[str, npt.NDArray[Any]
         pd.DataFrame(columns).to_csv(session.folder / name, index=False, float_format="%.9g")
 
 
-def extend(run: Run, quantities: dict[str, Any]) -> dict[str, Any]:
-    """result.json of a run with its quantities."""
-    return {**run.summary, "quantities": quantities}
+def extend(
+    summary: dict[str, Any], quantities: dict[str, Any], session: Session
+) -> dict[str, Any]:
+    """result.json: a run's summary with its quantities, and the seconds up to now as the total."""
+    seconds = summary["seconds"] | {"total": round(perf_counter() - session.started, 3)}
+    return {**summary, "seconds": seconds, "quantities": quantities}
 
 
 def lowest(net: Net, u: npt.NDArray[np.float64]) -> float:

@@ -188,7 +188,7 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
         }
         if session.root and session.pictures:
             _draw(case, session, model, snapshot)
-    return extend(outcome, quantities)
+    return extend(outcome.summary, quantities, session)
 
 
 def _points(case: DrapeCase, net: Net, snapshot: Snapshot) -> list[dict[str, Any]]:

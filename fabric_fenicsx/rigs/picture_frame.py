@@ -173,7 +173,7 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
         }
         if session.root and session.pictures:
             _draw(session, model, outcome.last, columns)
-    return extend(outcome, quantities)
+    return extend(outcome.summary, quantities, session)
 
 
 def _draw(session: Session, model: Model, last: Snapshot, columns: dict[str, Array]) -> None:
