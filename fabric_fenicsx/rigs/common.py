@@ -141,9 +141,7 @@ def write_table(session: Session, name: str, columns: dict[str, npt.NDArray[Any]
         pd.DataFrame(columns).to_csv(session.folder / name, index=False, float_format="%.9g")
 
 
-def extend(
-    summary: dict[str, Any], quantities: dict[str, Any], session: Session
-) -> dict[str, Any]:
+def extend(summary: dict[str, Any], quantities: dict[str, Any], session: Session) -> dict[str, Any]:
     """result.json: a run's summary with its quantities, and the seconds up to now as the total."""
     seconds = summary["seconds"] | {"total": round(perf_counter() - session.started, 3)}
     return {**summary, "seconds": seconds, "quantities": quantities}
