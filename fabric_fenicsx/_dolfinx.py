@@ -4,6 +4,7 @@ It speaks the newest meaning; what an older release lacks is supplied here, foun
 rather than by its version. Nothing else in the package asks for a version.
 
 Offered:
+    Function: dolfinx's own, from here so that nothing loads dolfinx before this file.
     interval_mesh: a mesh of two-node cells from arrays, on any communicator.
     lagrange, constants_per_cell: blocked function spaces.
     constant: a scalar or vector that a form reads at assembly.
@@ -26,7 +27,8 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-# VTK has to be loaded before dolfinx: the other way round its colour bars crash in std::regex.
+# VTK has to come before dolfinx, which shares its libraries' symbols with what is loaded after it:
+# VTK from PyPI would take std::regex from them and crash at the colour bar.
 import vtkmodules.vtkCommonCore  # noqa: F401
 
 # isort: split
@@ -37,9 +39,11 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
+from dolfinx.fem import Function
 from dolfinx.mesh import GhostMode, create_mesh
 
 __all__ = [
+    "Function",
     "add_matrix",
     "add_vector",
     "atan2",

@@ -100,10 +100,6 @@ def _run(
     from .rigs.load import load_case
 
     case = from_root(comm, lambda: load_case(path, settings))
-    if pictures and comm.rank == 0:
-        # VTK has to come before dolfinx, which shares its libraries' symbols with what is loaded
-        # after it: VTK from PyPI would take std::regex from them and crash at the colour bar.
-        import vtkmodules.vtkCommonCore  # noqa: F401
 
     from .rigs.common import Session
     from .rigs.registry import RUNNERS

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
+from .groups import Keys, NotNegative, Positive
 from .shear_law_keys import ShearLawKeys
 from .weave_keys import SheetKeys, WeaveKeys
 
@@ -28,15 +29,6 @@ __all__ = [
     "SolverKeys",
     "TowKeys",
 ]
-
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-
-
-class Keys(BaseModel):
-    """A group of keys: unknown ones are an error, numbers must be finite."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class TowKeys(Keys):

@@ -8,20 +8,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from ..mechanics import shear_laws
+from .groups import Keys, NotNegative, Positive
 
 __all__ = ["ShearLawKeys"]
-
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-
-
-class Keys(BaseModel):
-    """A law: unknown keys are an error, numbers must be finite."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class TabulatedSpringKeys(Keys):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from ..errors import InputError
 from ..fabric.crossings import areas, crossing_numbers
@@ -15,18 +15,16 @@ from ..fabric.layout import TowLayout, spaced_layout
 from ..fabric.net import Net
 from ..fabric.outline import Circle, Outline, Polygon, rectangle
 from ..fabric.weave import WEAVES, WeavePattern, pattern_from_file
+from .groups import Keys, Positive
 
 __all__ = ["SheetKeys", "WeaveKeys", "crossing_weights", "layout", "pattern"]
 
-Positive = Annotated[float, Field(gt=0.0)]
 Binary = Annotated[int, Field(ge=0, le=1)]
 Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
 
 
-class SheetKeys(BaseModel):
+class SheetKeys(Keys):
     """The sheet and its virtual tows; warp runs along y, weft along x."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     width_mm: Positive = Field(288.0, description="along x")
     length_mm: Positive = Field(288.0, description="along y")
@@ -37,10 +35,8 @@ class SheetKeys(BaseModel):
     )
 
 
-class WeaveKeys(BaseModel):
+class WeaveKeys(Keys):
     """Pattern, angles, outline and crimp of the tows."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     pattern: str | list[list[Binary]] = Field(
         "plain",

@@ -43,8 +43,9 @@ class Balance:
         """Columns for a converged step that ends at ``time``, its increment still in the fields."""
         model = self.model
         row: dict[str, float] = {}
+        forces = model.tool_forces()
         for tool in model.tools:
-            force = model.tool_forces()[tool.name]
+            force = forces[tool.name]
             place = np.array(tool.path(time))
             moved = place - self._tool_place[tool.name]
             self.external += float((force + self._tool_force[tool.name]) @ moved) / 2.0

@@ -16,10 +16,10 @@ from petsc4py import PETSc
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx.fem import Function
 from scipy import sparse
 
 from .. import _dolfinx
+from .._dolfinx import Function
 from ..fabric.crossings import reference_angle
 from ..fabric.net import Net
 from ..mechanics.fields import ConnectorFields, TowFields
@@ -126,7 +126,8 @@ class Discretisation:
 
     def _own_connectors(self) -> ConnectorFields | None:
         net, mine = self.net, self.local_crossings
-        self.connector_rows = np.zeros(0, dtype=PETSc.IntType)
+        self.connector_blocks = np.zeros(0, dtype=PETSc.IntType)
+        self.connector_rows = expand(self.connector_blocks)
         if len(mine) == 0:
             return None
         count = len(mine)
@@ -259,10 +260,9 @@ class Discretisation:
     def maps(self) -> tuple[PETSc.LGMap, PETSc.LGMap]:
         """Local-to-global maps of the tows' blocks and of the connectors' blocks."""
         blocks = np.asarray(self.global_blocks, dtype=PETSc.IntType)
-        connectors = getattr(self, "connector_blocks", np.zeros(0, dtype=PETSc.IntType))
         return (
             PETSc.LGMap().create(blocks, bsize=BLOCK, comm=self.comm),
-            PETSc.LGMap().create(connectors, bsize=BLOCK, comm=self.comm),
+            PETSc.LGMap().create(self.connector_blocks, bsize=BLOCK, comm=self.comm),
         )
 
     def gather_nodes(self, local: Array) -> Array:

@@ -7,7 +7,6 @@ prescribed motion that enters through the linear solve, and tolerances that roun
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -97,14 +96,11 @@ class Newton:
         snes.setTolerances(max_it=limit)
         self.snes = snes
 
-    def solve(
-        self, targets: npt.NDArray[np.float64], watch: Callable[[], None] | None = None
-    ) -> Outcome:
+    def solve(self, targets: npt.NDArray[np.float64]) -> Outcome:
         """Solve for the increment, starting from the values in ``x``.
 
         Args:
             targets: prescribed increments of the fixed rows, shape (n_fixed,).
-            watch: called after each iteration.
 
         Returns:
             How it ended; the increment stands in ``x`` and in the system's fields.
@@ -112,7 +108,6 @@ class Newton:
         self._target = targets
         self._history = []
         self._fresh = True
-        self._watch = watch
         start = perf_counter()
         before = self.system.assemble_seconds
         self.snes.solve(None, self.x)
@@ -160,8 +155,6 @@ class Newton:
         residual = norms[2]
         self._history.append(residual)
         self._step = norms[1] if iteration else float("inf")
-        if self._watch is not None:
-            self._watch()
         if not np.isfinite(residual):
             return int(reasons.DIVERGED_FNORM_NAN)
         if iteration > 0 and residual < self.force_tolerance:

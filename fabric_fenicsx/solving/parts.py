@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx.fem import Function
 
 from .. import _dolfinx
+from .._dolfinx import Function
 from ..mechanics import contact, crossover
 from ..mechanics.shear_laws import Crossing, LinearDashpot, PolynomialSpring, ShearLaw
 from ..mechanics.terms import Term, energy_term, work_term

@@ -11,9 +11,9 @@ from petsc4py import PETSc
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx.fem import Function
 
 from .. import _dolfinx
+from .._dolfinx import Function
 from ..mechanics.beam import SectionLaw, linear_section, linearised_forces
 from ..mechanics.terms import Term
 from .discretisation import BLOCK, Discretisation
@@ -129,8 +129,7 @@ class System:
         for form in self._residuals["tows"]:
             _dolfinx.add_vector(local, form)
         local[:own] -= self._load_work()[0].ravel()
-        F.array[:] = local[:own]
-        F.setValues(net.rows[own:], local[own:], addv=PETSc.InsertMode.ADD_VALUES)
+        self._put(local, F)
         if net.connectors is not None:
             values = np.zeros(len(net.connector_rows))
             for form in self._residuals["crossovers"]:
@@ -138,6 +137,12 @@ class System:
             F.setValues(net.connector_rows, values, addv=PETSc.InsertMode.ADD_VALUES)
         F.assemble()
         self.assemble_seconds += perf_counter() - start
+
+    def _put(self, local: Array, F: PETSc.Vec) -> None:
+        """Set a vector to the tows' local values, those of ghosts added on their owners."""
+        own = self.net.owned * BLOCK
+        F.array[:] = local[:own]
+        F.setValues(self.net.rows[own:], local[own:], addv=PETSc.InsertMode.ADD_VALUES)
 
     def tangent(self, A: PETSc.Mat) -> None:
         """Assemble the tangent at the increment and section forces set last."""
@@ -204,9 +209,7 @@ class System:
         local = np.zeros(len(net.rows))
         _dolfinx.add_vector(local, self._term_residuals[name])
         F = net.vector()
-        own = net.owned * BLOCK
-        F.array[:] = local[:own]
-        F.setValues(net.rows[own:], local[own:], addv=PETSc.InsertMode.ADD_VALUES)
+        self._put(local, F)
         F.assemble()
         return F.array_r.copy().reshape(-1, BLOCK)
 
