@@ -1,0 +1,10 @@
+"""The command line. Nothing here imports dolfinx before a run begins: help must come at once.
+
+A further command is a function in a module of its own, registered in `app.py`; it does its heavy
+imports inside, and what it does on several ranks inside `collective`.
+"""
+
+from .app import app
+from .collective import collective, from_root
+
+__all__ = ["app", "collective", "from_root"]

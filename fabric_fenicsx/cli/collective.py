@@ -1,0 +1,85 @@
+"""What every command does alike on several ranks: end together, read once, speak once."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+
+from ..errors import InputError, SolveError
+from ..parallel import rank
+
+__all__ = ["collective", "from_root", "say"]
+
+PATIENCE = 30.0
+"""Seconds that a rank with bad input waits for the others to find it bad as well."""
+
+
+def collective(action: Callable[[Any], int], folder: Path) -> int:
+    """Do on every rank what may fail on any of them; returns the exit code.
+
+    Bad input is one line from rank 0. Whatever else goes wrong on one of several ranks ends all of
+    them: the others would wait for ever.
+
+    Args:
+        action: given MPI's world; its exit code is this one's.
+        folder: where accepted steps are, for the line after an interrupt.
+    """
+    from mpi4py import MPI
+
+    comm = MPI.COMM_WORLD
+    guard = comm.Dup()
+    try:
+        return action(comm)
+    except (InputError, SolveError, KeyboardInterrupt) as error:
+        interrupted = isinstance(error, KeyboardInterrupt)
+        code = 130 if isinstance(error, KeyboardInterrupt) else error.exit_code
+        line = " ".join(str(error).split())
+        if interrupted:
+            line = f"interrupted: accepted steps are in {folder}, --resume goes on from the last"
+        say(line)
+        if not _all_come(guard, 2.0 if interrupted else PATIENCE):
+            if comm.rank != 0:
+                print(line, file=sys.stderr, flush=True)
+            comm.Abort(code)
+        return code
+    except Exception:
+        if comm.size == 1:
+            raise
+        traceback.print_exc()
+        sys.stderr.flush()
+        comm.Abort(1)
+        return 1
+
+
+def from_root(comm: Any, load: Callable[[], Any]) -> Any:
+    """What rank 0 alone reads, on every rank; its InputError as well. Collective."""
+    value, problem = None, None
+    if comm.rank == 0:
+        try:
+            value = load()
+        except InputError as error:
+            problem = str(error)
+    value, problem = comm.bcast((value, problem))
+    if problem is not None:
+        raise InputError(problem)
+    return value
+
+
+def _all_come(guard: Any, seconds: float) -> bool:
+    """Whether every rank comes here within a time."""
+    request, until = guard.Ibarrier(), monotonic() + seconds
+    while not request.Test():
+        if monotonic() > until:
+            return False
+        sleep(0.01)
+    return True
+
+
+def say(line: str) -> None:
+    """One line on stderr, from rank 0."""
+    if rank() == 0:
+        print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,67 @@
+"""The keys of a case file, as a table."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+from .collective import say
+
+__all__ = ["keys"]
+
+
+def keys(
+    rig: Annotated[
+        str | None, typer.Argument(metavar="[RIG]", help="One rig; default: every rig.")
+    ] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="As tables in Markdown.")] = False,
+) -> None:
+    """Print the keys of a case file with unit, default and what is allowed."""
+    from ..rigs.keys import CASES, documented, one_of
+
+    if rig is not None and rig not in CASES:
+        say(f"keys: {rig}, allowed is {one_of(list(CASES))}")
+        raise typer.Exit(InputError.exit_code)
+    headings = ("key", "unit", "default", "allowed", "meaning")
+    for name in [rig] if rig else list(CASES):
+        rows: list[tuple[str, ...]] = [
+            (key.name, key.unit, key.default, key.allowed, key.description)
+            for key in documented(CASES[name])
+        ]
+        text = " ".join((CASES[name].__doc__ or "").split())
+        if markdown:
+            _print_markdown(name, text, headings, rows)
+        else:
+            _print_table(name, text, headings, rows)
+
+
+def _print_markdown(
+    name: str, text: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]
+) -> None:
+    def line(cells: tuple[str, ...]) -> str:
+        return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+    print(f"## {name}\n\n{text}\n\n{line(headings)}\n{line(('---',) * len(headings))}")
+    for key, *rest in rows:
+        print(line((f"`{key}`", *rest)))
+    print()
+
+
+def _print_table(
+    name: str, text: str, headings: tuple[str, ...], rows: list[tuple[str, ...]]
+) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=f"{name}: {text}", title_justify="left")
+    for heading in headings:
+        wide = heading in ("allowed", "meaning")
+        table.add_column(heading, no_wrap=heading == "key", overflow="fold", ratio=1 if wide else 0)
+    for row in rows:
+        table.add_row(*(escape(cell) for cell in row))
+    console = Console()
+    # Piped, there is no width to keep to.
+    console.print(table, width=None if console.is_terminal else 160)
