@@ -43,6 +43,8 @@ class Crossing:
         number: makes a constant of the form from a number or a tuple, so that another value
             needs no compilation.
         past: history value by name, zero at first; what it becomes is the law's ``history``.
+        known_rate: γ̇ at the end of the step [rad/s] where it is known better than by the
+            difference quotient, as in a prescribed motion.
     """
 
     gamma: Any
@@ -50,6 +52,7 @@ class Crossing:
     per_time: Any
     number: Callable[[Any], Any]
     past: Callable[[str], Any]
+    known_rate: Any = None
 
     @property
     def change(self) -> Any:
@@ -58,8 +61,8 @@ class Crossing:
 
     @property
     def rate(self) -> Any:
-        """γ̇ as the difference quotient [rad/s]: zero at once when the motion stops."""
-        return self.change * self.per_time
+        """γ̇ [rad/s]; as the difference quotient it is zero at once when the motion stops."""
+        return self.change * self.per_time if self.known_rate is None else self.known_rate
 
 
 class ShearLaw(Protocol):

@@ -110,7 +110,7 @@ def _explained(model: type[BaseModel], problem: dict[str, Any]) -> tuple[Place, 
     kind, value = problem["type"], problem["input"]
     if kind == "extra_forbidden":
         group = _resolve(model, place[:-1])[1]
-        names = list(group.model_fields) if group else []
+        names = [field.alias or name for name, field in group.model_fields.items()] if group else []
         close = suggestion(str(place[-1]), names)
         listed = one_of(sorted(names, key=lambda name: f" {name}?" not in close))
         return place, f"{dotted_place(place)}: unknown key{close}, allowed are {listed}"

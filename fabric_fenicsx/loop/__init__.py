@@ -1,0 +1,1 @@
+"""The loop with measurements: fit the model, find what it lacks, add that, report the error."""

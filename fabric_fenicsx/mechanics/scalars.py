@@ -1,0 +1,120 @@
+"""UFL of scalars on numpy arrays: laws of one crossing without a mesh and without a compiler.
+
+A law of mechanics.shear_laws is an expression in γ, γ̇ and numbers. Here the same expression, with
+symbols in their place, becomes a function of arrays; its derivatives in any symbol are UFL's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from ufl import as_ufl, diff, variable
+from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
+from ufl.algorithms.apply_derivatives import apply_derivatives
+from ufl.classes import Label, ScalarValue, Variable, Zero
+from ufl.corealg.traversal import unique_post_traversal
+
+__all__ = ["derivative_of", "numpy_function", "symbol"]
+
+OPERATORS: dict[str, Callable[..., Any]] = {
+    "Sum": np.add,
+    "Product": np.multiply,
+    "Division": np.divide,
+    "Power": np.power,
+    "Abs": np.abs,
+    "Sign": np.sign,
+    "Sqrt": np.sqrt,
+    "Exp": np.exp,
+    "Ln": np.log,
+    "Sin": np.sin,
+    "Cos": np.cos,
+    "Tan": np.tan,
+    "Asin": np.arcsin,
+    "Acos": np.arccos,
+    "Atan": np.arctan,
+    "Atan2": np.arctan2,
+    "Sinh": np.sinh,
+    "Cosh": np.cosh,
+    "Tanh": np.tanh,
+    "Conditional": np.where,
+    "MaxValue": np.maximum,
+    "MinValue": np.minimum,
+    "LT": np.less,
+    "LE": np.less_equal,
+    "GT": np.greater,
+    "GE": np.greater_equal,
+    "EQ": np.equal,
+    "NE": np.not_equal,
+    "AndCondition": np.logical_and,
+    "OrCondition": np.logical_or,
+    "NotCondition": np.logical_not,
+}
+"""What an operator of UFL is in numpy, by the name of its class."""
+
+
+def symbol() -> Any:
+    """A scalar that a function takes and that expressions can be differentiated in."""
+    return variable(as_ufl(1.0))
+
+
+def derivative_of(expression: Any, by: Any) -> Any:
+    """d(expression)/d(symbol), carried out."""
+    return apply_derivatives(apply_algebra_lowering(diff(as_ufl(expression), by)))
+
+
+def numpy_function(
+    expressions: Sequence[Any], symbols: Mapping[str, Any]
+) -> Callable[[Mapping[str, Any]], list[Any]]:
+    """A function that evaluates scalar expressions; what they share is evaluated once.
+
+    Args:
+        expressions: in the symbols, numbers and operators of UFL.
+        symbols: by the name under which their values are passed.
+
+    Returns:
+        Takes values by name, numbers or arrays that broadcast, and gives one value for each
+        expression, a number where it depends on none of the arrays.
+
+    Raises:
+        ValueError: an operator that is none of scalars, or a symbol without a name.
+    """
+    inputs = {value.ufl_operands[1]: name for name, value in symbols.items()}
+    place: dict[Any, int] = {}
+    known: list[Any] = []
+    given: list[tuple[int, str]] = []
+    steps: list[tuple[int, Callable[..., Any], list[int]]] = []
+    results = []
+    for expression in expressions:
+        lowered = apply_derivatives(apply_algebra_lowering(as_ufl(expression)))
+        for node in unique_post_traversal(lowered):
+            if node in place or isinstance(node, Label):
+                continue
+            k = place[node] = len(known)
+            known.append(None)
+            kind = type(node).__name__
+            if isinstance(node, Variable):
+                if node.ufl_operands[1] not in inputs:
+                    raise ValueError("a symbol without a name in an expression of scalars")
+                given.append((k, inputs[node.ufl_operands[1]]))
+            elif isinstance(node, Zero):
+                known[k] = 0.0
+            elif isinstance(node, ScalarValue):
+                known[k] = float(node)
+            elif kind in OPERATORS:
+                operands = [place[operand] for operand in node.ufl_operands]
+                steps.append((k, OPERATORS[kind], operands))
+            else:
+                raise ValueError(f"{kind} in an expression of scalars")
+        results.append(place[lowered])
+
+    def evaluate(at: Mapping[str, Any]) -> list[Any]:
+        values = known.copy()
+        for k, name in given:
+            values[k] = at[name]
+        for k, operator, operands in steps:
+            values[k] = operator(*[values[i] for i in operands])
+        return [values[k] for k in results]
+
+    return evaluate
