@@ -172,7 +172,14 @@ class DrapeCase(Common):
         -0.2,
         description="between holder and die when closed; below zero the contact layers overlap",
     )
-    holder_closing_s: Positive = Field(6.0, description="time the holder takes to close")
+    holder_force_N: Positive | None = Field(
+        None,
+        description="force that pushes the whole holder down, instead of holder_gap_mm; its height "
+        "then follows from balance",
+    )
+    holder_closing_s: Positive = Field(
+        6.0, description="time the holder takes to close, or its force to rise"
+    )
     punch_offset_x_mm: float = Field(0.0, description="punch axis from the sheet's centre")
     punch_offset_y_mm: float = Field(0.0, description="punch axis from the sheet's centre")
     gravity_mm_s2: NotNegative = Field(9810.0, description="downwards")
@@ -180,7 +187,9 @@ class DrapeCase(Common):
     points: list[PointKeys] = Field(default_factory=list, description="where angles are compared")
 
     @model_validator(mode="after")
-    def _punch_fits(self) -> DrapeCase:
+    def _fits(self) -> DrapeCase:
+        if self.holder_force_N is not None and "holder_gap_mm" in self.model_fields_set:
+            raise ValueError("holder_force_N, holder_gap_mm: one of the two")
         if self.symmetry == "quarter" and (self.punch_offset_x_mm or self.punch_offset_y_mm):
             raise ValueError("punch_offset_x_mm, punch_offset_y_mm: need symmetry: none")
         too_deep = self.punch_travel_mm > self.punch_radius_mm + self.edge_radius_mm

@@ -1,11 +1,13 @@
 """Draping over a hemisphere (Wei & Zhang, Figures 12 to 17).
 
-The die lies below the sheet and is fixed; the blank holder above it closes to a prescribed gap;
-the punch presses the sheet through the hole. Tools are frictionless: the paper oiled them.
+The die lies below the sheet and is fixed; the blank holder above it closes to a prescribed gap or
+is pushed by a prescribed force; the punch presses the sheet through the hole. Tools are
+frictionless unless the case says otherwise: the paper oiled them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +83,15 @@ def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
     ]
 
 
+def pressed(case: DrapeCase) -> dict[str, Callable[[float], float]]:
+    """Force on the holder at a time [N], of the part that is modelled; empty with a given gap."""
+    whole = case.holder_force_N
+    if whole is None:
+        return {}
+    force = whole / (4.0 if case.symmetry == "quarter" else 1.0)
+    return {"holder": lambda time: force * min(time / case.holder_closing_s, 1.0)}
+
+
 def symmetry_planes(net: Net) -> list[Support]:
     """Nodes on x = 0 stay in that plane and turn about its normal only; likewise y = 0."""
     planes = []
@@ -113,6 +124,7 @@ def build(case: DrapeCase, session: Session) -> Model:
         viscosity=case.tow.relaxation_time_s,
         tools=tools(case, session.base),
         contact_law=contact_law(case.contact),
+        pressed=pressed(case),
         supports=symmetry_planes(net) if case.symmetry == "quarter" else (),
         interlacing=None if weave is None else crossing_weights(weave, keys, net, session.base),
         comm=session.comm,
@@ -153,7 +165,10 @@ def run(case: DrapeCase, session: Session) -> dict[str, Any]:
     model = build(case, session)
 
     def measure(snapshot: Snapshot) -> dict[str, float]:
-        return {"largest_shear_deg": float(np.degrees(np.abs(snapshot.shear_angle).max()))}
+        return {
+            "largest_shear_deg": float(np.degrees(np.abs(snapshot.shear_angle).max())),
+            "holder_height_mm": float(model.tool_place("holder")[2]),
+        }
 
     outcome = simulate(
         model,
@@ -178,9 +193,12 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
     if snapshot is not None:
         _write_crossings(session, net, snapshot)
         row = outcome.rows[-1]
+        parts = 4.0 if case.symmetry == "quarter" else 1.0
         quantities = {
             "punch_depth_mm": case.punch_travel_mm * snapshot.time / case.duration_s,
-            "punch_force_N": -row["punch_force_z_N"] * (4.0 if case.symmetry == "quarter" else 1.0),
+            "punch_force_N": -row["punch_force_z_N"] * parts,
+            "holder_force_N": -row["holder_force_z_N"] * parts,
+            "holder_height_mm": row["holder_height_mm"],
             "largest_shear_angle_deg": row["largest_shear_deg"],
             "lowest_point_mm": lowest(net, snapshot.displacement),
             "kinetic_over_stored_energy": _kinetic_share(outcome.rows),
@@ -221,7 +239,10 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
 def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -> None:
     extent = 0.62 * max(case.sheet.width_mm, case.sheet.length_mm)
     colours = {"punch": "#8aa0b8", "die": "#b8a58a", "holder": "#cfd6dd"}
-    surfaces = [_surface(tool, extent, snapshot.time, colours[tool.name]) for tool in model.tools]
+    surfaces = [
+        _surface(tool, extent, model.tool_place(tool.name), colours[tool.name])
+        for tool in model.tools
+    ]
     depth = case.punch_travel_mm * snapshot.time / case.duration_s
     for view, shown in (
         ("perspective", [s for s in surfaces if s.name != "holder"]),
@@ -239,9 +260,8 @@ def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -
 
 
 def _surface(
-    tool: Tool, extent: float, time: float, colour: str
+    tool: Tool, extent: float, place: npt.NDArray[np.float64], colour: str
 ) -> RevolvedSurface | TriangleSurface:
-    place = np.asarray(tool.path(time))
     if isinstance(tool, Mould):
         return TriangleSurface(tool.name, tool.surface.points, tool.surface.cells, place, colour)
     return RevolvedSurface(tool.name, tool.profile(extent), place, colour)

@@ -36,17 +36,17 @@ class Balance:
             tool.name: np.array([past.get(f"{tool.name}_force_{a}_N", 0.0) for a in "xyz"])
             for tool in model.tools
         }
-        self._tool_place = {tool.name: np.array(tool.path(model.time)) for tool in model.tools}
+        self._tool_place = {tool.name: model.tool_place(tool.name) for tool in model.tools}
         self._reaction: Array | None = None
 
-    def step(self, time: float) -> dict[str, float]:
-        """Columns for a converged step that ends at ``time``, its increment still in the fields."""
+    def step(self) -> dict[str, float]:
+        """Columns for a converged step, its increment still in the fields."""
         model = self.model
         row: dict[str, float] = {}
         forces = model.tool_forces()
         for tool in model.tools:
             force = forces[tool.name]
-            place = np.array(tool.path(time))
+            place = model.tool_place(tool.name)
             moved = place - self._tool_place[tool.name]
             self.external += float((force + self._tool_force[tool.name]) @ moved) / 2.0
             self._tool_force[tool.name], self._tool_place[tool.name] = force, place

@@ -257,6 +257,19 @@ class Discretisation:
         x.set(0.0)
         return x
 
+    def summed(self, local: Array) -> PETSc.Vec:
+        """A vector from the tows' local values, those of ghosts added on their owners."""
+        x = self.vector()
+        self.put(local, x)
+        x.assemble()
+        return x
+
+    def put(self, local: Array, x: PETSc.Vec) -> None:
+        """Set a vector as ``summed`` does, without assembling it."""
+        own = self.owned * BLOCK
+        x.array[:] = local[:own]
+        x.setValues(self.rows[own:], local[own:], addv=PETSc.InsertMode.ADD_VALUES)
+
     def maps(self) -> tuple[PETSc.LGMap, PETSc.LGMap]:
         """Local-to-global maps of the tows' blocks and of the connectors' blocks."""
         blocks = np.asarray(self.global_blocks, dtype=PETSc.IntType)

@@ -31,6 +31,7 @@ class Histories:
     def __init__(self, disc: Discretisation) -> None:
         self.disc = disc
         self._entries: dict[str, tuple[Where, Any, Any]] = {}
+        self._numbers: dict[str, Array] = {}
         self._node_length: Array | None = None
 
     def add(self, name: str, where: Where, field: Any, expression: Any) -> None:
@@ -59,6 +60,15 @@ class Histories:
             _dolfinx.compile_form(form, disc.comm, here=here),
         )
 
+    def add_numbers(self, name: str, values: Array) -> None:
+        """Keep numbers in the step files that whoever hands them over changes in place himself.
+
+        Args:
+            name: unique; names the array in step files.
+            values: the same on every rank, in an array that stays the same object.
+        """
+        self._numbers[name] = values
+
     def update(self) -> None:
         """Evaluate every expression, then change the fields."""
         new = []
@@ -78,7 +88,7 @@ class Histories:
     def save(self) -> dict[str, Array]:
         """The remembered values in the order of the net, on every rank. Collective."""
         disc = self.disc
-        saved = {}
+        saved = {name: values.copy() for name, values in self._numbers.items()}
         for name, (where, field, _) in self._entries.items():
             if where == "nodes":
                 saved[name] = disc.gather_nodes(field.x.array.reshape(-1, 3)[: disc.owned])
@@ -92,6 +102,8 @@ class Histories:
     def load(self, saved: dict[str, Array]) -> None:
         """Put saved values back; KeyError where one is missing."""
         disc = self.disc
+        for name, numbers in self._numbers.items():
+            numbers[:] = saved[name]
         for name, (where, field, _) in self._entries.items():
             values = saved[name]
             if field is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,6 +67,8 @@ class Model:
         viscosity: relaxation time τ of bending and twist [s].
         tools: what the fabric touches.
         contact_law: how it touches.
+        pressed: tools pushed downwards by a force [N] at a time, by their names, instead of by
+            their paths; see solving.pressed.
         supports: prescribed motions.
         interlacing: share of the in-plane moments at each crossing, (n_crossings,); by default 1.
         extra: further terms, from the fields of the tows and of the connectors (None on a rank
@@ -88,6 +90,7 @@ class Model:
         viscosity: float = 0.0,
         tools: Sequence[Tool] = (),
         contact_law: ContactLaw | None = None,
+        pressed: Mapping[str, Callable[[float], float]] | None = None,
         supports: Sequence[Support] = (),
         interlacing: Array | None = None,
         extra: Callable[[TowFields, ConnectorFields | None], Sequence[Term]] | None = None,
@@ -120,7 +123,9 @@ class Model:
         if self.tools:
             if contact_law is None:
                 raise ValueError("tools need a contact law")
-            self.contacts = Contacts(self.disc, self.tools, contact_law, self.histories)
+            self.contacts = Contacts(
+                self.disc, self.tools, contact_law, self.histories, pressed or {}
+            )
             terms += self.contacts.terms
         if extra is not None:
             terms += list(extra(self.fields, self.disc.connectors))
@@ -183,7 +188,14 @@ class Model:
 
     def newton(self, *, force_tolerance: float, limit: int) -> Newton:
         """A Newton solver for this model."""
-        return Newton(self.system, self.fixed, force_tolerance=force_tolerance, limit=limit)
+        pressed = () if self.contacts is None else self.contacts.pressed.values()
+        return Newton(
+            self.system,
+            self.fixed,
+            force_tolerance=force_tolerance,
+            limit=limit,
+            dyads=[tool.dyad for tool in pressed],
+        )
 
     def targets(self, start: float, end: float) -> Array:
         """Prescribed increments of the fixed rows over a step."""
@@ -210,6 +222,12 @@ class Model:
         """Whether any support is moved rather than held."""
         return any(support.displacement is not None for support in self._supports)
 
+    def stand(self, time: float) -> None:
+        """Put the tools to their places at the end of the accepted step, after its state is set."""
+        self.time = time
+        if self.contacts is not None:
+            self.contacts.stand(time)
+
     def fixed_components(self) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
         """Net nodes and components of every fixed row of every support."""
         nodes = [np.repeat(s.nodes, len(s.components)) for s in self._supports]
@@ -225,6 +243,8 @@ class Model:
     def remember(self) -> None:
         """Update what the next step starts from, with the increment still in the fields."""
         self.histories.update()
+        if self.contacts is not None:
+            self.contacts.advance()
 
     # What a reader asks for ---------------------------------------------------------------
 
@@ -239,6 +259,12 @@ class Model:
             own = -self._on_nodes(tool).sum(axis=0)
             forces[tool.name] = self.comm.allreduce(own)
         return forces
+
+    def tool_place(self, name: str) -> Array:
+        """Where a tool's reference point is at the last increment [mm], shape (3,)."""
+        if self.contacts is None:
+            raise KeyError(name)
+        return self.contacts.place(name)
 
     def weight_work(self) -> float:
         """Work of gravity over the step whose increment stands in the fields [N mm]."""

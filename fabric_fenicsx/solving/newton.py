@@ -7,6 +7,7 @@ prescribed motion that enters through the linear solve, and tolerances that roun
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -16,6 +17,8 @@ from petsc4py import PETSc
 import numpy as np
 import numpy.typing as npt
 
+from ..errors import SolveError
+from .pressed import Dyad, DyadicLU
 from .system import System
 
 __all__ = ["Newton", "Outcome"]
@@ -45,6 +48,8 @@ class Newton:
         force_tolerance: residual norm [N, N mm] at which the nodes are in balance.
         limit: iterations after which a step has failed.
         prefix: PETSc options prefix, the same on all ranks.
+        dyads: parts c rᵀ/s of the tangent beside the assembled matrix, to be taken off it; each
+            gives (c, r, s), or None where it has nothing at this iterate.
     """
 
     def __init__(
@@ -55,6 +60,7 @@ class Newton:
         force_tolerance: float,
         limit: int = 25,
         prefix: str = "fabric_",
+        dyads: Sequence[Callable[[], Dyad | None]] = (),
     ) -> None:
         self.system = system
         self.force_tolerance = force_tolerance
@@ -72,6 +78,7 @@ class Newton:
         self._target = np.zeros(len(fixed))
         self._history: list[float] = []
         self._fresh = True
+        self._refused = ""
 
         snes = PETSc.SNES().create(net.comm)
         snes.setOptionsPrefix(prefix)
@@ -94,6 +101,11 @@ class Newton:
         snes.setConvergenceTest(self._test)
         snes.setFromOptions()
         snes.setTolerances(max_it=limit)
+        if dyads:
+            self._dyads = list(dyads)
+            pc = snes.getKSP().getPC()
+            pc.setType(PETSc.PC.Type.PYTHON)
+            pc.setPythonContext(DyadicLU(self._free_dyads, prefix))
         self.snes = snes
 
     def solve(self, targets: npt.NDArray[np.float64]) -> Outcome:
@@ -108,6 +120,7 @@ class Newton:
         self._target = targets
         self._history = []
         self._fresh = True
+        self._refused = ""
         start = perf_counter()
         before = self.system.assemble_seconds
         self.snes.solve(None, self.x)
@@ -130,7 +143,7 @@ class Newton:
         if reason > 0:
             return "converged"
         if reason == reasons.DIVERGED_FNORM_NAN:
-            return "the residual is not a number"
+            return self._refused or "the residual is not a number"
         if reason == reasons.DIVERGED_LINEAR_SOLVE:
             return "the tangent could not be factorised"
         if reason == reasons.DIVERGED_MAX_IT:
@@ -138,7 +151,12 @@ class Newton:
         return "the iteration diverges"
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, F: PETSc.Vec) -> None:
-        self.system.set_increment(x, linearise_from="zero" if self._fresh else "last")
+        try:
+            self.system.set_increment(x, linearise_from="zero" if self._fresh else "last")
+        except SolveError as error:
+            self._refused = str(error)
+            F.set(np.nan)
+            return
         self._fresh = False
         self.system.residual(F)
         if len(self._fixed_local):
@@ -149,6 +167,13 @@ class Newton:
         # Columns are kept, so that the prescribed motion enters through the linear solve.
         P.zeroRows(self._fixed_global, diag=1.0)
         self.factorisations += 1
+
+    def _free_dyads(self) -> list[Dyad]:
+        """The dyads, without the rows whose increment is prescribed."""
+        found = [dyad for dyad in (make() for make in self._dyads) if dyad is not None]
+        for column, _, _ in found:
+            column.array[self._fixed_local] = 0.0
+        return found
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         reasons = PETSc.SNES.ConvergedReason

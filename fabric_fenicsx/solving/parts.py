@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from ..mechanics.terms import Term, energy_term, work_term
 from ..mechanics.tools import SampledTool, Tool
 from .discretisation import BLOCK, Discretisation
 from .history import Histories
+from .pressed import PressedTool
 
 __all__ = ["ContactLaw", "Contacts", "Crossings", "CrossoverLaw"]
 
@@ -177,12 +178,26 @@ class Contacts:
         tools: what the fabric touches.
         law: how it touches.
         histories: where the friction's memory goes.
+        pressed: force [N] at a time that pushes a tool downwards, by its name; the height of such a
+            tool follows from balance, its path says where it starts.
+
+    Raises:
+        ValueError: a force on a tool that there is not.
     """
 
     def __init__(
-        self, disc: Discretisation, tools: Sequence[Tool], law: ContactLaw, histories: Histories
+        self,
+        disc: Discretisation,
+        tools: Sequence[Tool],
+        law: ContactLaw,
+        histories: Histories,
+        pressed: Mapping[str, Callable[[float], float]],
     ) -> None:
+        unknown = set(pressed) - {tool.name for tool in tools}
+        if unknown:
+            raise ValueError(f"no tool is called {', '.join(sorted(unknown))}")
         self.tools = list(tools)
+        self.pressed: dict[str, PressedTool] = {}
         self.terms: list[Term] = []
         self.frictional = law.friction > 0.0
         self._places: list[Any] = []
@@ -213,6 +228,7 @@ class Contacts:
 
             energy = contact.contact_energy(tows, distance, *pressure)
             self.terms.append(energy_term(tool.name, tows, energy))
+            traction = None
             if self.frictional:
                 traction_n = Function(tows.u_n.function_space)
                 traction = contact.friction_traction(
@@ -222,8 +238,43 @@ class Contacts:
                 loss = contact.traction_loss(tows, traction, shift)
                 self.terms.append(work_term(f"{tool.name} friction", tows, work, loss=loss))
                 histories.add(f"{tool.name}: traction", "nodes", traction_n, traction)
+            if tool.name in pressed:
+                self.pressed[tool.name] = PressedTool(
+                    disc,
+                    pressed[tool.name],
+                    energy,
+                    traction,
+                    place=place,
+                    shift=shift,
+                    moved=self._sample,
+                    reach=law.layer,
+                )
+                histories.add_numbers(f"{tool.name}: height", self.pressed[tool.name].height_n)
 
     def refresh(self) -> None:
+        """Bring everything up to date that depends on the increment otherwise than by UFL."""
+        self._sample()
+        for tool in self.pressed.values():
+            tool.balance()
+
+    def stand(self, time: float) -> None:
+        """Put the tools where they were when the step that ended at this time was accepted."""
+        for tool, place in zip(self.tools, self._places, strict=True):
+            place.value[:] = tool.path(time)
+        for pressed in self.pressed.values():
+            pressed.stand(time)
+
+    def advance(self) -> None:
+        """The step is accepted."""
+        for tool in self.pressed.values():
+            tool.advance()
+
+    def place(self, name: str) -> Array:
+        """Where a tool's reference point is [mm], (3,)."""
+        names = [tool.name for tool in self.tools]
+        return np.array(self._places[names.index(name)].value)
+
+    def _sample(self) -> None:
         """Sample the tools that are not analytic at the nodes' places, ghosts included."""
         if not self._samples:
             return
@@ -242,3 +293,5 @@ class Contacts:
         for tool, place, shift in zip(self.tools, self._places, self._shifts, strict=True):
             place.value[:] = tool.path(end)
             shift.value[:] = np.subtract(tool.path(end), tool.path(start))
+        for pressed in self.pressed.values():
+            pressed.stand(end)

@@ -94,7 +94,7 @@ class Record:
             "iterations": step.iterations,
             "failed_attempts": step.failures,
         }
-        row |= self._balance.step(step.time)
+        row |= self._balance.step()
         row |= measure(snapshot)
         self.rows.append(row)
         if self._root:
@@ -175,6 +175,7 @@ def load_state(path: Path, stepper: Stepper) -> None:
         stepper.model.histories.load(saved)
     except KeyError as error:
         raise InputError(f"{path}: has no history {error}, which this case needs") from None
+    stepper.model.stand(state.time)
 
 
 class _replacing:

@@ -129,7 +129,7 @@ class System:
         for form in self._residuals["tows"]:
             _dolfinx.add_vector(local, form)
         local[:own] -= self._load_work()[0].ravel()
-        self._put(local, F)
+        net.put(local, F)
         if net.connectors is not None:
             values = np.zeros(len(net.connector_rows))
             for form in self._residuals["crossovers"]:
@@ -137,12 +137,6 @@ class System:
             F.setValues(net.connector_rows, values, addv=PETSc.InsertMode.ADD_VALUES)
         F.assemble()
         self.assemble_seconds += perf_counter() - start
-
-    def _put(self, local: Array, F: PETSc.Vec) -> None:
-        """Set a vector to the tows' local values, those of ghosts added on their owners."""
-        own = self.net.owned * BLOCK
-        F.array[:] = local[:own]
-        F.setValues(self.net.rows[own:], local[own:], addv=PETSc.InsertMode.ADD_VALUES)
 
     def tangent(self, A: PETSc.Mat) -> None:
         """Assemble the tangent at the increment and section forces set last."""
@@ -208,10 +202,7 @@ class System:
         net = self.net
         local = np.zeros(len(net.rows))
         _dolfinx.add_vector(local, self._term_residuals[name])
-        F = net.vector()
-        self._put(local, F)
-        F.assemble()
-        return F.array_r.copy().reshape(-1, BLOCK)
+        return net.summed(local).array_r.copy().reshape(-1, BLOCK)
 
     def section_forces(self) -> Array:
         """(N, M) of this rank's cells at the increment set last, (n_local_cells, 6) [N, N mm]."""

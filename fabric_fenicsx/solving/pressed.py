@@ -1,0 +1,192 @@
+"""A tool that is pushed by a given force: its height follows from the balance with the contact.
+
+The height z is eliminated: at every iterate w it is the root of f(w, z) = F, where f is the force
+[N] by which the fabric lifts the tool and F the one that pushes it down. The tool has no mass. With
+R the tool's part of the residual, and since contact knows the place relative to the tool only,
+
+    ∂R/∂z = −K e,   df = (eᵀ K) · dw − s dz,   s = eᵀ K e,   e = (0, 0, 1) in every node,
+
+so that the tangent of R(w, z(w)) is K − (K e)(eᵀ K)/s: Newton's full tangent is that of the fixed
+height and a dyad, which needs one more back-substitution (Sherman & Morrison).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import numpy as np
+from ufl import as_vector, derivative, dot
+
+from .. import _dolfinx
+from ..errors import SolveError
+from ..mechanics.fields import TowFields
+from .discretisation import Discretisation
+
+__all__ = ["Dyad", "DyadicLU", "PressedTool"]
+
+#: c, r and s of a dyad c rᵀ/s.
+Dyad = tuple[PETSc.Vec, PETSc.Vec, float]
+
+#: Of the force: the balance of the tool is met to this part of it at every iterate.
+TOLERANCE = 1e-10
+
+#: Evaluations of the force after which the height has not been found.
+LIMIT = 100
+
+
+class PressedTool:
+    """The height of one tool under a given force. Compiles four forms, two without friction.
+
+    Args:
+        disc: the discretised net.
+        force: with which the tool is pushed downwards at a time [N]; 0 leaves it where its path is.
+        energy: contact energy of the tool (UFL).
+        traction: friction per tow length (UFL), None where there is none.
+        place: constant of the forms, the tool's place; its height is changed here.
+        shift: constant of the forms, the tool's move over the step.
+        moved: called when the height has changed, before forces are evaluated.
+        reach: by how much the tool is lowered at first when it touches nothing [mm].
+    """
+
+    def __init__(
+        self,
+        disc: Discretisation,
+        force: Callable[[float], float],
+        energy: Any,
+        traction: Any | None,
+        *,
+        place: Any,
+        shift: Any,
+        moved: Callable[[], None],
+        reach: float,
+    ) -> None:
+        self._disc, self._force = disc, force
+        self._place, self._shift, self._moved, self._reach = place, shift, moved, reach
+        tows, comm = disc.tows, disc.comm
+        up = as_vector((0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+        residual, lift = _work(tows, energy, traction, tows.test), _work(tows, energy, traction, up)
+        row = derivative(lift, tows.w, tows.test)
+        self._lift = _dolfinx.compile_form(lift, comm)
+        self._stiffness = _dolfinx.compile_form(derivative(lift, tows.w, up), comm)
+        self._row = self._column = _dolfinx.compile_form(row, comm)
+        if traction is not None:
+            self._column = _dolfinx.compile_form(derivative(residual, tows.w, up), comm)
+        self.target = 0.0
+        self.height_n = np.array([float(place.value[2])])
+
+    def stand(self, time: float) -> None:
+        """The force is that at a time, the height the accepted one; ``balance`` goes on from it."""
+        self.target = self._force(time)
+        if self.target > 0.0:
+            self._move(self.height_n[0])
+
+    def advance(self) -> None:
+        """The step is accepted."""
+        self.height_n[0] = self._place.value[2]
+
+    def balance(self) -> None:
+        """Find the height at the increment in the fields, by Newton between bounds. Collective.
+
+        Raises:
+            SolveError: there is none within LIMIT evaluations, as at an iterate that is lost.
+        """
+        if self.target <= 0.0:
+            return
+        low, high = -np.inf, np.inf
+        reach = self._reach
+        z = float(self._place.value[2])
+        for _ in range(LIMIT):
+            lift, stiffness = self._state()
+            missing = self.target - lift
+            if abs(missing) <= TOLERANCE * self.target:
+                return
+            if missing > 0.0:
+                high = z
+            else:
+                low = z
+            guess = z - missing / stiffness if stiffness > 0.0 else -np.inf
+            # Where the tool barely touches, the tangent would throw it far through the fabric.
+            if missing > 0.0 and z - guess > reach:
+                guess, reach = z - reach, 2.0 * reach
+            if not low < guess < high:
+                guess = (low + high) / 2.0
+            if guess in (low, high):
+                return
+            z = guess
+            self._move(z)
+        raise SolveError(f"no height of the pushed tool gives {self.target:.6g} N")
+
+    def dyad(self) -> Dyad | None:
+        """K e, eᵀ K and s at the increment set last; None while no force acts. Collective."""
+        if self.target <= 0.0:
+            return None
+        row = self._vector(self._row)
+        column = self._vector(self._column) if self._column is not self._row else row.copy()
+        return column, row, self._state()[1]
+
+    def _state(self) -> tuple[float, float]:
+        own = np.array([_dolfinx.cell_scalar(self._lift), _dolfinx.cell_scalar(self._stiffness)])
+        total = np.zeros(2)
+        self._disc.comm.Allreduce(own, total, op=MPI.SUM)
+        return float(total[0]), float(total[1])
+
+    def _move(self, z: float) -> None:
+        self._shift.value[2] = z - self.height_n[0]
+        self._place.value[2] = z
+        self._moved()
+
+    def _vector(self, form: Any) -> PETSc.Vec:
+        local = np.zeros(len(self._disc.rows))
+        _dolfinx.add_vector(local, form)
+        return self._disc.summed(local)
+
+
+def _work(tows: TowFields, energy: Any, traction: Any | None, v: Any) -> Any:
+    """Virtual work of pressure and friction on v."""
+    work = derivative(energy, tows.w, v)
+    if traction is None:
+        return work
+    return work + dot(traction, as_vector([v[0], v[1], v[2]])) * tows.nodes
+
+
+class DyadicLU:
+    """Context of a PETSc preconditioner of type python: LU of A, and dyads taken off A.
+
+    (A − c rᵀ/s)⁻¹ b = y + p (r·y)/(s − r·p) with A y = b and A p = c; with several dyads one after
+    the other.
+
+    Args:
+        dyads: gives (c, r, s) of each, c already zero in rows whose increment is prescribed.
+        prefix: PETSc options prefix of the factorisation.
+    """
+
+    def __init__(self, dyads: Callable[[], list[Dyad]], prefix: str) -> None:
+        self._dyads, self._prefix = dyads, prefix
+        self._lu: PETSc.PC | None = None
+        self._solved: list[Dyad] = []
+
+    def setUp(self, pc: PETSc.PC) -> None:
+        """Factorise, and solve for every dyad's column."""
+        A, P = pc.getOperators()
+        if self._lu is None:
+            self._lu = PETSc.PC().create(pc.comm)
+            self._lu.setOptionsPrefix(self._prefix)
+        self._lu.setOperators(A, P)
+        self._lu.setFromOptions()
+        self._lu.setUp()
+        self._solved = []
+        for column, row, s in self._dyads():
+            p = column.duplicate()
+            self.apply(pc, column, p)
+            self._solved.append((p, row, s - row.dot(p)))
+
+    def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = (A − Σ dyads)⁻¹ b."""
+        assert self._lu is not None
+        self._lu.apply(b, y)
+        for p, row, rest in self._solved:
+            y.axpy(row.dot(y) / rest, p)

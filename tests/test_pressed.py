@@ -1,0 +1,178 @@
+"""A blank holder pushed by a force: its height, its friction, its tangent, and a drape with it."""
+
+import shutil
+from pathlib import Path
+from time import perf_counter
+
+from mpi4py import MPI
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from fabric_fenicsx.errors import InputError
+from fabric_fenicsx.fabric.net import single_tow
+from fabric_fenicsx.fabric.section import RectangularSection
+from fabric_fenicsx.mechanics.tools import HoledPlate
+from fabric_fenicsx.rigs import drape
+from fabric_fenicsx.rigs.cases import DrapeCase
+from fabric_fenicsx.rigs.common import Session
+from fabric_fenicsx.rigs.load import load_case
+from fabric_fenicsx.solving.model import Model, Support
+from fabric_fenicsx.solving.parts import ContactLaw
+from solve import Statics
+
+SECTION = RectangularSection(width=4.57, height=0.04, density=7e-9, C1=60000.0)
+LENGTH = 40.0
+PATIENT = {"first_step_s": 0.1, "largest_step_s": 0.75}
+
+
+def squeezed(force, *, mu, pull=0.0, cells=8, far=1e4):
+    """A tow along x between die and holder, its first node moved along x by ``pull`` over the run.
+
+    The faces are those of holed plates whose hole is ``far`` away. The die overlaps the tow by
+    0.1 mm at first, so that there is a vertical stiffness from the start.
+    """
+    x = np.linspace(0.0, LENGTH, cells + 1)
+    net = single_tow(np.column_stack([x, np.zeros((cells + 1, 2))]), (0.0, 0.0, 1.0))
+    supports = [Support(np.arange(cells + 1), (1, 3, 4, 5))]
+    if pull:
+        supports.append(
+            Support(np.array([0]), (0,), lambda time: np.array([[-pull * time, 0.0, 0.0]]))
+        )
+    else:
+        supports.append(Support(np.arange(cells + 1), (0,)))
+    return Model(
+        net,
+        SECTION,
+        tools=[
+            HoledPlate("die", lambda time: (far, 0.0, 0.1), 1.0, 4.0, 1.0),
+            HoledPlate("holder", lambda time: (far, 0.0, 0.5), 1.0, 4.0, -1.0),
+        ],
+        contact_law=ContactLaw(stiffness=0.5, layer=0.5, friction=mu, stick_stiffness=0.5),
+        pressed={"holder": lambda time: force},
+        supports=supports,
+    )
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("force", [0.4, 30.0])
+def test_height_between_flat_plates(force):
+    """Each face sinks by d with ψ′(d) = F/L: in the layer d = √(2δp/k), beyond it d = p/k + δ/2."""
+    model = squeezed(force, mu=0.0)
+    Statics(model, force_tolerance=1e-10).run(1)
+    p, k, layer = force / LENGTH, 0.5, 0.5
+    d = np.sqrt(2.0 * layer * p / k) if p < k * layer / 2.0 else p / k + layer / 2.0
+    assert (d > layer) == (force > 10.0)
+    # The distance functions round their roots by 1e-4 mm, which moves a face by 5e-9 mm.
+    assert model.tool_place("holder")[2] == pytest.approx(0.1 - 2.0 * d, abs=3e-8)
+    assert model.tool_forces()["holder"][2] == pytest.approx(-force, rel=1e-9)
+
+
+@pytest.mark.mpi
+def test_pulling_a_tow_from_under_the_holder():
+    """Both faces slip: the pull is 2 μ F, whatever the contact stiffness; it is the tow's tension.
+
+    Pulled by 2 mm; the stick stretches by μp/k_t = 0.3 · 0.1/0.5 = 0.06 mm before.
+    """
+    force, mu = 4.0, 0.3
+    model = squeezed(force, mu=mu, pull=2.0)
+    statics = Statics(model, force_tolerance=1e-9, limit=40)
+    for _ in range(9):
+        statics.step(0.1, keep=True)
+    statics.step(0.1, keep=False)
+    assert model.reactions()[0, 0] == pytest.approx(-2.0 * mu * force, rel=1e-6)
+    tension = model.snapshot(1.0).section_forces[:, 0]
+    # Half-way along cell i the nodes behind it carry the load: falls linearly to the free end.
+    middles = (np.arange(8) + 0.5) / 8.0
+    assert tension == pytest.approx(2.0 * mu * force * (1.0 - middles), rel=1e-6)
+
+
+@pytest.mark.mpi
+def test_tangent_with_a_free_height():
+    """K − (K e)(eᵀ K)/s against central differences of the residual, on the rounded edge as well.
+
+    The height is found anew at each place, to 1e-10 of the force: differences over 1e-5 mm have an
+    error of some 1e-6 of the largest entry.
+    """
+    model = squeezed(2.0, mu=0.3, far=LENGTH / 2.0)
+    disc, system = model.disc, model.system
+    model.set_time(0.0, 1.0)
+    rng = np.random.default_rng(3)
+    nodes = len(disc.net.points) * 6
+    w, h = rng.normal(size=(2, nodes)) * np.tile([1e-2] * 3 + [1e-3] * 3, nodes // 6)
+    # Deep enough that the edges of the holes touch.
+    w[2::6] -= 0.3
+
+    def vector(values):
+        x = disc.vector()
+        x.array[:] = values.reshape(-1, 6)[disc.local_nodes[: disc.owned]].ravel()
+        return x
+
+    def residual(values):
+        F = disc.vector()
+        # Twice: about the place itself, so that the tangent's section forces are those there.
+        for _ in range(2):
+            system.set_increment(vector(values), linearise_from="last")
+        system.residual(F)
+        return F.array_r.copy()
+
+    eps = 1e-3
+    difference = (residual(w + eps * h) - residual(w - eps * h)) / (2.0 * eps)
+    residual(w)
+    column, row, s = model.contacts.pressed["holder"].dyad()
+    A = disc.matrix()
+    system.tangent(A)
+    product = disc.vector()
+    A.mult(vector(h), product)
+    product.axpy(-row.dot(vector(h)) / s, column)
+    scale = np.abs(difference).max()
+    assert product.array_r == pytest.approx(difference, abs=1e-5 * scale)
+
+
+def test_drape_with_a_holder_force(tmp_path):
+    """The force is met at every step and the energies balance; a resumed run ends the same."""
+    small = {
+        "test": "drape",
+        "sheet": {"width_mm": 144, "length_mm": 144},
+        "punch_radius_mm": 30,
+        "hole_radius_mm": 34,
+        "edge_radius_mm": 8,
+        "punch_travel_mm": 18,
+        "duration_s": 18,
+        "holder_force_N": 80,
+        "contact": {"friction": 0.2},
+        "solver": PATIENT,
+    }
+    case = DrapeCase.model_validate(small)
+
+    def run(folder, resume):
+        where = Session(
+            folder, MPI.COMM_SELF, Path(), perf_counter(), resume=resume, pictures=False
+        )
+        return drape.run(case, where), pd.read_csv(folder / "steps.csv")
+
+    result, steps = run(tmp_path, resume=False)
+    assert result["completed"]
+    assert result["quantities"]["holder_force_N"] == pytest.approx(80.0, rel=1e-8)
+    wanted = 20.0 * np.minimum(steps["time_s"] / 6.0, 1.0)
+    assert -steps["holder_force_z_N"].to_numpy() == pytest.approx(wanted.to_numpy(), rel=1e-8)
+    last = steps.iloc[-1]
+    assert abs(last["remainder_N_mm"]) < 0.02 * last["external_work_N_mm"]
+
+    again = tmp_path / "again"
+    shutil.copytree(tmp_path / "steps", again / "steps")
+    shutil.copytree(tmp_path / "paraview", again / "paraview")
+    shutil.copy(tmp_path / "steps.csv", again)
+    for file in sorted((again / "steps").glob("*.npz"))[len(steps) * 2 // 3 :]:
+        file.unlink()
+    _, resumed = run(again, resume=True)
+    columns = ["holder_height_mm", "external_work_N_mm", "lost_N_mm", "stored_N_mm"]
+    assert resumed.iloc[-1][columns].to_numpy() == pytest.approx(last[columns].to_numpy(), rel=1e-5)
+
+
+def test_force_and_gap_exclude_each_other(tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text("test: drape\nholder_force_N: 100\nholder_gap_mm: -0.1\n")
+    with pytest.raises(InputError, match="holder_force_N, holder_gap_mm: one of the two"):
+        load_case(path)
