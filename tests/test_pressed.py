@@ -9,6 +9,7 @@ from mpi4py import MPI
 import numpy as np
 import pandas as pd
 import pytest
+from solve import Statics
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import single_tow
@@ -20,7 +21,6 @@ from fabric_fenicsx.rigs.common import Session
 from fabric_fenicsx.rigs.load import load_case
 from fabric_fenicsx.solving.model import Model, Support
 from fabric_fenicsx.solving.parts import ContactLaw
-from solve import Statics
 
 SECTION = RectangularSection(width=4.57, height=0.04, density=7e-9, C1=60000.0)
 LENGTH = 40.0
