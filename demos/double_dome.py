@@ -24,7 +24,8 @@ from fabric_fenicsx.fabric.gmsh_io import read_msh, write_msh
 from fabric_fenicsx.fabric.section import RectangularSection
 from fabric_fenicsx.fabric.sheet import centred_sheet
 from fabric_fenicsx.mechanics.tools import Mould
-from fabric_fenicsx.output.pictures import TriangleSurface, draw_net
+from fabric_fenicsx.output.pictures import draw_net
+from fabric_fenicsx.output.surfaces import TriangleSurface
 from fabric_fenicsx.solving.model import Model, Support
 from fabric_fenicsx.solving.parts import ContactLaw, CrossoverLaw
 from fabric_fenicsx.solving.record import prepare_folder

@@ -22,7 +22,8 @@ from fabric_fenicsx.fabric.gmsh_io import read_msh, write_msh
 from fabric_fenicsx.fabric.section import RectangularSection
 from fabric_fenicsx.fabric.sheet import centred_sheet
 from fabric_fenicsx.mechanics.tools import HoledPlate, Sphere
-from fabric_fenicsx.output.pictures import RevolvedSurface, draw_net
+from fabric_fenicsx.output.pictures import draw_net
+from fabric_fenicsx.output.surfaces import RevolvedSurface
 from fabric_fenicsx.solving.generalised_alpha import GeneralisedAlpha
 from fabric_fenicsx.solving.model import Model, Support
 from fabric_fenicsx.solving.parts import ContactLaw, CrossoverLaw

@@ -64,6 +64,7 @@ def _run(
 
     from ..rigs.common import Session
     from ..rigs.registry import RUNNERS
+    from ..rigs.write_case import case_text
     from ..solving.record import prepare_folder, write_result
     from ..terminal import following, summarise
 
@@ -71,6 +72,7 @@ def _run(
     root = comm.rank == 0
     with following(quiet=quiet or not root) as progress:
         session = Session(folder, comm, path.parent, started, progress, resume, pictures)
+        session.case_text = case_text(case, path.parent)
         result = RUNNERS[case.test](case, session)
     if root:
         write_result(folder, result)

@@ -10,21 +10,27 @@ from __future__ import annotations
 import math
 import os
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import numpy.typing as npt
-from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints
+from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkDataArray, vtkObject, vtkPoints
 from vtkmodules.vtkCommonDataModel import VTK_LINE, VTK_VERTEX, vtkCellArray, vtkUnstructuredGrid
-from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader, vtkXMLUnstructuredGridWriter
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.snapshot import Snapshot
 
-__all__ = ["TimeSeries"]
+__all__ = ["TimeSeries", "listed_steps", "read_step"]
+
+PLACE = "place_of_"
+"""Begins the name of the field data that tell where a tool is."""
 
 COMPONENTS = {
     "displacement": ("x", "y", "z"),
@@ -39,7 +45,8 @@ class TimeSeries:
     `tows_*.vtu` has at the points displacement [mm], the directors d1, d2, d3 and contact_pressure
     [N/mm]; in the cells section_forces N1, N2, N3 [N], section_moments M1, M2, M3 [N mm], tow and
     family (0 warp, 1 weft). `crossings_*.vtu` has displacement [mm], shear_angle_deg, angle_deg
-    (90 less the shear angle) and moment [N mm]; a net without crossings writes none.
+    (90 less the shear angle) and moment [N mm]; a net without crossings writes none. Field data of
+    the tows are TimeValue [s] and the place of each tool [mm], `place_of_punch`.
 
     Without `resume` the folder starts anew: the steps of an earlier series in it are removed.
 
@@ -68,7 +75,7 @@ class TimeSeries:
         self._steps = self._kept(until) if resume else {}
         for series in self._grids:
             self._write_collection(series)
-        kept = {self._file(series, n).name for series in self._grids for n in self._steps}
+        kept = {_file(self._folder, series, n).name for series in self._grids for n in self._steps}
         for path in list(self._folder.iterdir()):
             ours = re.fullmatch(r"(tows|crossings)(_\d{5,}\.vtu(\.part)?|\.pvd\.part)", path.name)
             if ours and path.name not in kept:
@@ -81,11 +88,16 @@ class TimeSeries:
         """Times of the steps in the series [s]."""
         return list(self._steps.values())
 
-    def add(self, snapshot: Snapshot) -> None:
+    def add(
+        self,
+        snapshot: Snapshot,
+        places: Mapping[str, npt.NDArray[np.float64]] = MappingProxyType({}),
+    ) -> None:
         """Write one step and name it in the collections.
 
         Args:
             snapshot: the step; its time lies after that of the last one.
+            places: where each tool is [mm], by its name.
 
         Raises:
             ValueError: an array has not the shape that the net asks for, or time runs backwards.
@@ -103,40 +115,122 @@ class TimeSeries:
             step.ShallowCopy(grid)  # shares points and cells
             if series == "tows":
                 _add_tows(step, self._net, snapshot)
+                for name, place in places.items():
+                    step.GetFieldData().AddArray(_array(PLACE + name, np.array([place])))
             else:
                 _add_crossings(step, self._net, snapshot)
             step.GetFieldData().AddArray(_array("TimeValue", np.array([snapshot.time])))
-            _write_grid(step, self._file(series, number))
+            _write_grid(step, _file(self._folder, series, number))
         self._steps[number] = float(snapshot.time)
         for series in self._grids:
             self._write_collection(series)
 
-    def _file(self, series: str, number: int) -> Path:
-        return self._folder / f"{series}_{number:05d}.vtu"
-
     def _kept(self, until: float) -> dict[int, float]:
         """Number and time of the steps that every collection names, up to a time."""
-        listed = [_read_collection(self._folder / f"{series}.pvd") for series in self._grids]
-        return {
-            number: time
-            for number, time in sorted(listed[0].items())
-            if time <= until + 1e-12 * abs(until)
-            and all(number in steps for steps in listed)
-            and all(self._file(series, number).exists() for series in self._grids)
-        }
+        whole = listed_steps(self._folder, crossings="crossings" in self._grids)
+        return {n: time for n, time in whole.items() if time <= until + 1e-12 * abs(until)}
 
     def _write_collection(self, series: str) -> None:
         root = ET.Element("VTKFile", type="Collection", version="0.1")
         collection = ET.SubElement(root, "Collection")
         for number, time in self._steps.items():
             attributes = {"timestep": repr(time), "part": "0"}
-            attributes["file"] = self._file(series, number).name
+            attributes["file"] = _file(self._folder, series, number).name
             ET.SubElement(collection, "DataSet", attributes)
         ET.indent(root)
         path = self._folder / f"{series}.pvd"
         unfinished = path.with_name(path.name + ".part")
         ET.ElementTree(root).write(unfinished, encoding="utf-8", xml_declaration=True)
         os.replace(unfinished, path)
+
+
+def listed_steps(folder: Path, *, crossings: bool) -> dict[int, float]:
+    """Number and time [s] of the steps that a series in a folder has whole, in order.
+
+    Args:
+        folder: that of the series.
+        crossings: whether steps have a file of crossings beside that of tows.
+
+    Raises:
+        InputError: a collection cannot be read.
+    """
+    series = ("tows", "crossings") if crossings else ("tows",)
+    listed = [_read_collection(folder / f"{name}.pvd") for name in series]
+    return {
+        number: time
+        for number, time in sorted(listed[0].items())
+        if all(number in steps for steps in listed)
+        and all(_file(folder, name, number).exists() for name in series)
+    }
+
+
+def read_step(
+    folder: Path, net: Net, number: int, time: float
+) -> tuple[Snapshot, dict[str, npt.NDArray[np.float64]]]:
+    """A step of a series: its snapshot and where each tool was [mm], by name, shape (3,).
+
+    Args:
+        folder: that of the series.
+        net: the net of the series.
+        number: of the step, one of `listed_steps`.
+        time: of the step [s].
+
+    Raises:
+        InputError: a file is not whole or belongs to another net.
+    """
+    tows = _read_grid(_file(folder, "tows", number))
+    at_points, in_cells, fields = tows.GetPointData(), tows.GetCellData(), tows.GetFieldData()
+    shear, moment = np.zeros(0), np.zeros(0)
+    try:
+        if len(net.crossings):
+            at_crossings = _read_grid(_file(folder, "crossings", number)).GetPointData()
+            shear = np.radians(_values(at_crossings, "shear_angle_deg"))
+            moment = _values(at_crossings, "moment")
+        snapshot = Snapshot(
+            time=time,
+            displacement=_values(at_points, "displacement"),
+            directors=np.stack([_values(at_points, f"d{i + 1}") for i in range(3)], axis=1),
+            section_forces=_values(in_cells, "section_forces"),
+            section_moments=_values(in_cells, "section_moments"),
+            contact_pressure=_values(at_points, "contact_pressure"),
+            shear_angle=shear,
+            crossing_moment=moment,
+        )
+        snapshot.check(net)
+    except ValueError as error:
+        path = _file(folder, "tows", number)
+        raise InputError(f"{path}: not a step of this run ({error})") from None
+    names = (fields.GetArrayName(i) for i in range(fields.GetNumberOfArrays()))
+    places = {
+        name.removeprefix(PLACE): _values(fields, name)[0]
+        for name in names
+        if name.startswith(PLACE)
+    }
+    return snapshot, places
+
+
+def _file(folder: Path, series: str, number: int) -> Path:
+    return folder / f"{series}_{number:05d}.vtu"
+
+
+def _read_grid(path: Path) -> vtkUnstructuredGrid:
+    reader = vtkXMLUnstructuredGridReader()
+    reader.SetFileName(str(path))
+    # A broken file is found by what it lacks; VTK would print its own lines about it.
+    loud = vtkObject.GetGlobalWarningDisplay()
+    vtkObject.SetGlobalWarningDisplay(0)
+    try:
+        reader.Update()
+    finally:
+        vtkObject.SetGlobalWarningDisplay(loud)
+    return reader.GetOutput()
+
+
+def _values(data: Any, name: str) -> npt.NDArray[np.float64]:
+    array = data.GetArray(name)
+    if array is None:
+        raise ValueError(f"{name} is missing")
+    return np.array(vtk_to_numpy(array), dtype=np.float64)
 
 
 def _read_collection(path: Path) -> dict[int, float]:

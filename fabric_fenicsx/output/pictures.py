@@ -18,76 +18,13 @@ from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.output.mirror import whole_sheet
 from fabric_fenicsx.output.snapshot import Snapshot
+from fabric_fenicsx.output.surfaces import RevolvedSurface, TriangleSurface, triangulated
 
-__all__ = ["COLOURS", "VIEWS", "RevolvedSurface", "TriangleSurface", "draw_net"]
+__all__ = ["COLOURS", "VIEWS", "draw_net"]
 
 Array = npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RevolvedSurface:
-    """A tool: a profile turned about the vertical axis through a centre.
-
-    Attributes:
-        name: what the tool is called.
-        profile: radius and height above the centre along the profile [mm], shape (k, 2).
-        centre: point on the axis [mm], shape (3,).
-        colour: any colour that matplotlib knows.
-        opacity: from 0 (invisible) to 1.
-
-    Raises:
-        ValueError: the profile or the centre has another shape, or a radius is negative.
-    """
-
-    name: str
-    profile: npt.NDArray[np.float64]
-    centre: npt.NDArray[np.float64]
-    colour: str = "#9fb0c3"
-    opacity: float = 0.35
-
-    def __post_init__(self) -> None:
-        shape = np.shape(self.profile)
-        if len(shape) != 2 or shape[0] < 2 or shape[1] != 2:
-            raise ValueError(f"surface {self.name}: profile has shape {shape}, not (k >= 2, 2)")
-        if np.shape(self.centre) != (3,):
-            shape = np.shape(self.centre)
-            raise ValueError(f"surface {self.name}: centre has shape {shape}, not (3,)")
-        if np.min(self.profile[:, 0]) < 0.0:
-            raise ValueError(f"surface {self.name}: profile has a negative radius")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TriangleSurface:
-    """A tool of any shape, as triangles.
-
-    Attributes:
-        name: what the tool is called.
-        points: corners relative to the tool's place [mm], shape (n, 3).
-        cells: three points of each triangle, shape (m, 3).
-        place: where the tool is [mm], shape (3,).
-        colour: any colour that matplotlib knows.
-        opacity: from 0 (invisible) to 1.
-
-    Raises:
-        ValueError: the points, the triangles or the place have another shape.
-    """
-
-    name: str
-    points: npt.NDArray[np.float64]
-    cells: npt.NDArray[np.int64]
-    place: npt.NDArray[np.float64]
-    colour: str = "#9fb0c3"
-    opacity: float = 0.35
-
-    def __post_init__(self) -> None:
-        for what, value in (("points", self.points), ("cells", self.cells)):
-            shape = np.shape(value)
-            if len(shape) != 2 or shape[0] < 1 or shape[1] != 3:
-                raise ValueError(f"surface {self.name}: {what} has shape {shape}, not (n >= 1, 3)")
-        if np.shape(self.place) != (3,):
-            shape = np.shape(self.place)
-            raise ValueError(f"surface {self.name}: place has shape {shape}, not (3,)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,11 +124,10 @@ def draw_net(
         if given not in allowed:
             raise ValueError(f"picture: {key} is {given!r}, not one of {', '.join(allowed)}")
 
+    if mirror:
+        net, snapshot = whole_sheet(net, snapshot)
     quantity = COLOURS[colour]
     lines = list(_tows(net, snapshot, quantity))
-    if mirror:
-        for axis in (0, 1):
-            lines = _mirrored(lines, axis, tolerance=1e-6 * _spacing(net))
     if limits is None:
         limits = _limits(quantity, np.concatenate([line.values for line in lines]))
     if not limits[0] < limits[1]:
@@ -199,7 +135,7 @@ def draw_net(
     step = _step(limits[1] - limits[0])
     diverging = quantity.signed and limits[0] < 0.0 < limits[1]
     tubes = _tubes(lines, radius if radius is not None else 0.12 * _spacing(net))
-    tools = [(_surface(surface), surface) for surface in surfaces]
+    tools = [(triangulated(surface), surface) for surface in surfaces]
 
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -287,35 +223,6 @@ def _spacing(net: Net) -> float:
     return float(np.median(gaps)) if len(gaps) else 0.1 * float(np.max(np.ptp(net.points, axis=0)))
 
 
-def _mirrored(lines: list[_Line], axis: int, *, tolerance: float) -> list[_Line]:
-    """Lines and their images in the plane where a coordinate is 0; what ends in it is joined."""
-    flip = np.ones(3)
-    flip[axis] = -1.0
-    whole = []
-    for line in lines:
-        image = _Line(line.points * flip, line.values)
-        distance = np.abs(line.points[:, axis])
-        if distance.max() <= tolerance:
-            whole.append(line)
-        elif distance[0] <= tolerance:
-            whole.append(_joined(image, line))
-        elif distance[-1] <= tolerance:
-            whole.append(_joined(line, image, backwards=True))
-        else:
-            whole += [line, image]
-    return whole
-
-
-def _joined(first: _Line, second: _Line, *, backwards: bool = False) -> _Line:
-    """One line of two that share their first points, or with `backwards` their last."""
-    if backwards:
-        first, second = (_Line(x.points[::-1], x.values[::-1]) for x in (first, second))
-    return _Line(
-        np.concatenate([first.points[::-1], second.points[1:]]),
-        np.concatenate([first.values[::-1], second.values[1:]]),
-    )
-
-
 def _limits(quantity: _Colour, values: Array) -> tuple[float, float]:
     """Round ends of a colour scale that shows all values and keeps 0 in its place."""
     known = values[np.isfinite(values)]
@@ -349,27 +256,6 @@ def _tubes(lines: list[_Line], radius: float) -> pv.PolyData:
     curves = pv.PolyData(np.concatenate(points), lines=np.concatenate(polylines))
     curves["values"] = np.concatenate(values)
     return curves.tube(radius=radius, n_sides=SIDES, capping=True)
-
-
-def _surface(surface: RevolvedSurface | TriangleSurface) -> pv.PolyData:
-    """The surface as a mesh of triangles in its place."""
-    if isinstance(surface, RevolvedSurface):
-        return _revolved(surface)
-    faces = np.insert(surface.cells, 0, 3, axis=1).ravel()
-    return pv.PolyData(np.asarray(surface.points, dtype=np.float64) + surface.place, faces=faces)
-
-
-def _revolved(surface: RevolvedSurface, pieces: int = 180) -> pv.PolyData:
-    """The surface as a mesh of triangles."""
-    angle = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
-    r, z = np.asarray(surface.profile, dtype=np.float64).T
-    around = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
-    points = r[None, :, None] * around[:, None] + z[None, :, None] * np.array([0.0, 0.0, 1.0])
-    corner = (np.arange(pieces)[:, None] * len(r) + np.arange(len(r) - 1)).ravel()
-    quads = corner[:, None] + np.array([0, len(r), len(r) + 1, 1])
-    faces = np.insert(quads, 0, 4, axis=1)
-    mesh = pv.PolyData(points.reshape(-1, 3) + surface.centre, faces=faces.ravel())
-    return mesh.triangulate().clean(tolerance=1e-9)  # closes the seam and the pole
 
 
 def _light(plotter: Any) -> None:

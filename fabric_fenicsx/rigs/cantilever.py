@@ -123,6 +123,7 @@ def _hang(
         iteration_limit=case.solver.iteration_limit,
         measure=measure,
         progress=lambda time, number, its: session.progress(begun + share * time, number, its),
+        case_text=session.case_text,
         started=session.started,
     )
 

@@ -49,6 +49,7 @@ class Session:
         progress: told (fraction done, accepted steps, iterations of the last one).
         resume: go on from the last step in the folder.
         pictures: draw them.
+        case_text: the case as it is run, kept beside the records.
     """
 
     folder: Path
@@ -58,6 +59,7 @@ class Session:
     progress: Callable[[float, int, int], None] = field(default=lambda *_: None)
     resume: bool = False
     pictures: bool = True
+    case_text: str | None = None
 
     @property
     def root(self) -> bool:

@@ -22,8 +22,9 @@ from ..fabric.sheet import Sheet, centred_sheet
 from ..geometry.distance import DistanceGrid
 from ..geometry.triangles import read_stl
 from ..mechanics.tools import HoledPlate, Mould, Sphere, Tool
-from ..output.pictures import RevolvedSurface, TriangleSurface, draw_net
+from ..output.pictures import draw_net
 from ..output.snapshot import Snapshot
+from ..output.surfaces import tool_surface
 from ..solving.generalised_alpha import GeneralisedAlpha
 from ..solving.model import Model, Support
 from ..solving.parts import ContactLaw
@@ -181,6 +182,7 @@ def run(case: DrapeCase, session: Session) -> dict[str, Any]:
         measure=measure,
         progress=lambda time, step, its: session.progress(time / case.duration_s, step, its),
         resume=session.resume,
+        case_text=session.case_text,
         started=session.started,
     )
     return report(case, session, model, outcome)
@@ -238,11 +240,7 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
 
 def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -> None:
     extent = 0.62 * max(case.sheet.width_mm, case.sheet.length_mm)
-    colours = {"punch": "#8aa0b8", "die": "#b8a58a", "holder": "#cfd6dd"}
-    surfaces = [
-        _surface(tool, extent, model.tool_place(tool.name), colours[tool.name])
-        for tool in model.tools
-    ]
+    surfaces = [tool_surface(tool, extent, model.tool_place(tool.name)) for tool in model.tools]
     depth = case.punch_travel_mm * snapshot.time / case.duration_s
     for view, shown in (
         ("perspective", [s for s in surfaces if s.name != "holder"]),
@@ -257,11 +255,3 @@ def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -
             title=f"punch at {depth:.0f} mm",
             mirror=case.symmetry == "quarter",
         )
-
-
-def _surface(
-    tool: Tool, extent: float, place: npt.NDArray[np.float64], colour: str
-) -> RevolvedSurface | TriangleSurface:
-    if isinstance(tool, Mould):
-        return TriangleSurface(tool.name, tool.surface.points, tool.surface.cells, place, colour)
-    return RevolvedSurface(tool.name, tool.profile(extent), place, colour)

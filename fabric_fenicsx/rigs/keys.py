@@ -37,6 +37,7 @@ UNITS = {
     "mm_s2": "mm/s²",
     "mm_min": "mm/min",
     "N_mm": "N/mm",
+    "per_MPa": "1/MPa",
     "MPa": "MPa",
     "deg": "°",
     "mm": "mm",

@@ -155,6 +155,7 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
         measure=measure,
         progress=lambda time, step, its: session.progress(time / end, step, its),
         resume=session.resume,
+        case_text=session.case_text,
         started=session.started,
     )
     rows = outcome.rows

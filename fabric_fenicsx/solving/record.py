@@ -8,30 +8,47 @@ dies leaves whole files only.
 from __future__ import annotations
 
 import csv
+import errno
+import fcntl
 import json
 import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
+from ..fabric.net import Net
 from ..output.paraview import TimeSeries
+from ..output.results import read_net, write_setup
 from ..output.snapshot import Snapshot
+from ..output.surfaces import tool_surface
 from .balance import Balance
 from .model import Model
 from .stepping import Step, Stepper
 
 __all__ = ["Record", "load_state", "prepare_folder", "write_result"]
 
+PLATE_EXTENT = 1.24
+"""How far out die and holder are drawn, over the farthest node of the flat sheet."""
+
+STEP_SCHEMA = "fabric-step/1"
+
+STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6}
+"""What a step file has for each node, and how many numbers of it."""
+
+_CLAIMED: dict[Path, int] = {}
+"""Folders that this process has locked, and the handles that hold the locks."""
+
 
 def prepare_folder(folder: Path, comm: Any) -> None:
-    """Make the output folder; collective.
+    """Make the output folder and keep other runs out of it until this process ends; collective.
 
     Raises:
-        InputError: it cannot be made or written (on every rank).
+        InputError: it cannot be made or written, or another run writes there (on every rank).
     """
     problem = None
     if comm.rank == 0:
@@ -40,11 +57,34 @@ def prepare_folder(folder: Path, comm: Any) -> None:
             probe = folder / ".writable"
             probe.write_text("")
             probe.unlink()
+            problem = _claim(folder)
         except OSError as error:
             problem = f"{folder}: the output folder cannot be written ({error.strerror})"
     problem = comm.bcast(problem)
     if problem:
         raise InputError(problem)
+
+
+def _claim(folder: Path) -> str | None:
+    """Lock the folder; what is wrong if another process has it.
+
+    The system drops the lock with the process, however that ends, so that none is ever stale.
+    """
+    if folder.resolve() in _CLAIMED:
+        return None
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        return f"{folder}: another run writes there, allowed is another folder"
+    except OSError as error:
+        # Some network file systems know no locks; there two runs are the user's own affair.
+        if error.errno not in (errno.EBADF, errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):
+            os.close(handle)
+            raise
+    _CLAIMED[folder.resolve()] = handle
+    return None
 
 
 class Record:
@@ -54,15 +94,27 @@ class Record:
         folder: output folder; made by prepare_folder.
         model: what is run.
         resume_at: keep the steps up to this time [s]; None starts afresh.
+        case_text: what `case.yaml` shall say; None writes none.
     """
 
-    def __init__(self, folder: Path, model: Model, *, resume_at: float | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        model: Model,
+        *,
+        resume_at: float | None = None,
+        case_text: str | None = None,
+    ) -> None:
         self.folder, self.model = folder, model
         self.rows: list[dict[str, float]] = []
         self.steps = folder / "steps"
         self._root = model.comm.rank == 0
         if self._root:
             self._open(resume_at)
+            (folder / "case.yaml").unlink(missing_ok=True)
+            if case_text is not None:
+                with _replacing(folder / "case.yaml") as path:
+                    path.write_text(case_text, encoding="utf-8")
         past = model.comm.bcast(self.rows[-1] if self.rows else None)
         self._balance = Balance(model, past)
 
@@ -70,7 +122,9 @@ class Record:
         """Start the series and the table, or cut both at the time to go on from."""
         folder, net = self.folder, self.model.net
         self.steps.mkdir(exist_ok=True)
+        extent = PLATE_EXTENT * float(np.abs(net.points[:, :2]).max())
         table = folder / "steps.csv"
+        write_setup(folder, net, [tool_surface(t, extent, np.zeros(3)) for t in self.model.tools])
         if resume_at is None:
             for old in [*self.steps.glob("step_*.npz"), table, folder / "result.json"]:
                 old.unlink(missing_ok=True)
@@ -98,7 +152,9 @@ class Record:
         row |= measure(snapshot)
         self.rows.append(row)
         if self._root:
-            self._series.add(snapshot)
+            self._series.add(
+                snapshot, {tool.name: model.tool_place(tool.name) for tool in model.tools}
+            )
             with _replacing(self.folder / "steps.csv") as path, path.open("w", newline="") as file:
                 writer = csv.DictWriter(file, list(row))
                 writer.writeheader()
@@ -124,6 +180,7 @@ class Record:
                 with path.open("wb") as file:
                     np.savez(
                         file,
+                        schema=STEP_SCHEMA,
                         time=step.time,
                         number=step.number,
                         previous_step=state.previous_step,
@@ -146,14 +203,27 @@ def load_state(path: Path, stepper: Stepper) -> None:
         InputError: it is not a step of this net.
     """
     disc, state = stepper.net, stepper.state
+    setup = path.parents[1] / "net.npz"
+    if setup.exists() and not _same(read_net(setup), disc.net):
+        raise InputError(f"{path}: a step of another net than that of this case")
     try:
         with np.load(path, allow_pickle=False) as file:
             data = {name: file[name] for name in file.files}
-        nodes = data["u"].shape[0]
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"{path}: not a step file ({error})") from None
-    if nodes != len(disc.net.points):
-        raise InputError(f"{path}: a step of {nodes} nodes; this net has {len(disc.net.points)}")
+        schema = str(data.get("schema", STEP_SCHEMA))  # the first files did not say
+        if schema != STEP_SCHEMA:
+            raise ValueError(f"schema {schema}, this version reads {STEP_SCHEMA}")
+        missing = {*STATE, "time", "number", "previous_step", "next_step"} - set(data)
+        if missing:
+            raise KeyError(f"{', '.join(sorted(missing))} missing")
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+        line = " ".join(str(error).split()).strip("'")
+        raise InputError(f"{path}: not a step file ({line})") from None
+    nodes = len(disc.net.points)
+    for name, width in STATE.items():
+        if data[name].shape != (nodes, width):
+            raise InputError(
+                f"{path}: {name} has shape {data[name].shape}; that of this net is {nodes, width}"
+            )
 
     def local(name: str) -> npt.NDArray[np.float64]:
         return data[name][disc.local_nodes]
@@ -175,7 +245,19 @@ def load_state(path: Path, stepper: Stepper) -> None:
         stepper.model.histories.load(saved)
     except KeyError as error:
         raise InputError(f"{path}: has no history {error}, which this case needs") from None
+    except (ValueError, IndexError):
+        raise InputError(f"{path}: a history has not the shape that this net needs") from None
     stepper.model.stand(state.time)
+
+
+def _same(one: Net, other: Net) -> bool:
+    """Whether two nets are the same up to rounding."""
+    return (
+        one.points.shape == other.points.shape
+        and np.array_equal(one.cells, other.cells)
+        and np.array_equal(one.crossings, other.crossings)
+        and bool(np.allclose(one.points, other.points, rtol=0.0, atol=1e-9))
+    )
 
 
 class _replacing:

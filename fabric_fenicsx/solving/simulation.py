@@ -52,6 +52,7 @@ def simulate(
     measure: Callable[[Snapshot], dict[str, float]] = lambda snapshot: {},
     progress: Callable[[float, int, int], None] = lambda time, step, iterations: None,
     resume: bool = False,
+    case_text: str | None = None,
     started: float | None = None,
 ) -> Run:
     """Run a model to its end, or as far as it goes. Collective.
@@ -68,6 +69,7 @@ def simulate(
         measure: further columns for each step's row, from its snapshot.
         progress: told the time reached, the step and its iterations.
         resume: go on from the last step file in the folder.
+        case_text: the case as YAML, to be kept beside the records.
         started: perf_counter() at the start of the command, for the total seconds.
 
     Returns:
@@ -86,7 +88,8 @@ def simulate(
         load_state(files[-1], stepper)
         if stepper.state.time >= end * (1.0 - 1e-12):
             raise InputError(f"{folder}: the run is complete, there is nothing to resume")
-    record = Record(folder, model, resume_at=stepper.state.time if resume else None)
+    resume_at = stepper.state.time if resume else None
+    record = Record(folder, model, resume_at=resume_at, case_text=case_text)
 
     last: list[Snapshot] = []
 

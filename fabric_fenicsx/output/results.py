@@ -1,0 +1,140 @@
+"""The folder of a run as others read it, without dolfinx: net, tools and accepted steps.
+
+`net.npz` is the undeformed net, `tools/punch.vtp` the shape of a tool in coordinates of its own;
+`paraview/` has what changes from step to step, the places of the tools among it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+import pyvista as pv
+
+from fabric_fenicsx.errors import InputError
+from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.output.mirror import whole_sheet
+from fabric_fenicsx.output.paraview import listed_steps, read_step
+from fabric_fenicsx.output.snapshot import Snapshot
+from fabric_fenicsx.output.surfaces import (
+    OTHER_COLOUR,
+    TOOL_COLOURS,
+    RevolvedSurface,
+    TriangleSurface,
+    triangulated,
+)
+
+__all__ = ["Results", "read_net", "read_results", "write_setup"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Results:
+    """A run on disk.
+
+    Attributes:
+        folder: where it is.
+        net: its net, undeformed; of the part that was computed.
+        tools: shapes of the tools, placed at the origin.
+        steps: number and time [s] of the accepted steps, in order.
+    """
+
+    folder: Path
+    net: Net
+    tools: list[TriangleSurface]
+    steps: dict[int, float]
+
+    def nearest(self, time: float | None) -> int:
+        """Number of the step nearest to a time [s]; of the last one for None."""
+        if time is None:
+            return max(self.steps)
+        return min(self.steps, key=lambda number: abs(self.steps[number] - time))
+
+    def at(
+        self, number: int, *, mirror: bool = False
+    ) -> tuple[Net, Snapshot, list[TriangleSurface]]:
+        """Net, state and the tools in their places at a step.
+
+        Args:
+            number: of the step.
+            mirror: the whole sheet of a quarter.
+
+        Raises:
+            InputError: a file of the step is broken.
+        """
+        net = self.net
+        snapshot, places = read_step(self.folder / "paraview", net, number, self.steps[number])
+        if mirror:
+            net, snapshot = whole_sheet(net, snapshot)
+        tools = [replace(t, place=places[t.name]) for t in self.tools if t.name in places]
+        return net, snapshot, tools
+
+
+def write_setup(
+    folder: Path, net: Net, tools: Sequence[RevolvedSurface | TriangleSurface] = ()
+) -> None:
+    """Write what of a run stays the same; one rank calls it.
+
+    Args:
+        folder: of the run; exists.
+        net: the net.
+        tools: shapes of the tools, placed at the origin.
+    """
+    path = folder / "net.npz"
+    partial = path.with_name(path.name + ".partial")
+    with partial.open("wb") as file:
+        np.savez_compressed(file, **{f.name: getattr(net, f.name) for f in fields(Net)})
+    os.replace(partial, path)
+    shapes = folder / "tools"
+    for old in shapes.glob("*.vtp"):
+        old.unlink()
+    for tool in tools:
+        shapes.mkdir(exist_ok=True)
+        triangulated(tool).save(shapes / f"{tool.name}.vtp")
+
+
+def read_net(path: Path) -> Net:
+    """The net of a run from its `net.npz`.
+
+    Raises:
+        InputError: there is none or it is broken.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return Net(**{f.name: file[f.name] for f in fields(Net)})
+    except FileNotFoundError:
+        raise InputError(
+            f"{path}: no such file, allowed is the folder of a run (fabric-fenicsx run)"
+        ) from None
+    except Exception as error:  # a broken archive raises whatever it likes
+        line = " ".join(str(error).split())
+        raise InputError(f"{path}: not the net of a run ({line})") from None
+
+
+def read_results(folder: Path) -> Results:
+    """Open the folder of a run.
+
+    Raises:
+        InputError: it is none, or it has no accepted step.
+    """
+    parts = sorted(path.parent for path in folder.glob("*/net.npz"))
+    if not (folder / "net.npz").exists() and parts:
+        names = " or ".join(str(part) for part in parts)
+        raise InputError(f"{folder}: has several specimens, allowed is {names}")
+    net = read_net(folder / "net.npz")
+    steps = listed_steps(folder / "paraview", crossings=len(net.crossings) > 0)
+    if not steps:
+        raise InputError(f"{folder}: no accepted step, allowed is the folder of a run that has one")
+    tools = [_tool(path) for path in sorted((folder / "tools").glob("*.vtp"))]
+    return Results(folder, net, tools, steps)
+
+
+def _tool(path: Path) -> TriangleSurface:
+    mesh = pv.read(path)
+    if not isinstance(mesh, pv.PolyData) or not mesh.n_cells or not mesh.is_all_triangles:
+        raise InputError(f"{path}: not the triangles of a tool")
+    cells = mesh.faces.reshape(-1, 4)[:, 1:].astype(np.int64)
+    colour = TOOL_COLOURS.get(path.stem, OTHER_COLOUR)
+    return TriangleSurface(path.stem, np.array(mesh.points, float), cells, np.zeros(3), colour)
