@@ -66,7 +66,13 @@ atan2 = getattr(ufl, "atan2", None) or ufl.atan_2
 
 _BASIX_UFL = hasattr(ufl, "__version__") and not hasattr(ufl, "FiniteElement")
 _FORM_OPTIONS = inspect.signature(fem.form).parameters
-_JIT_OPTIONS = {"timeout": 600, "cffi_extra_compile_args": ["-O2", "-g0"]}
+# The parts of -ffast-math that speed straight-line code up; the rest would change how the whole
+# process rounds, or take infinities for granted to be absent.
+_C_FLAGS = (
+    "-O2 -g0 -fno-math-errno -fno-trapping-math -fno-signed-zeros -fassociative-math "
+    "-freciprocal-math"
+).split()
+_JIT_OPTIONS = {"timeout": 600, "cffi_extra_compile_args": _C_FLAGS}
 
 # Seconds that this process has spent in the form compiler, for the run's report.
 compile_seconds: list[float] = [0.0]

@@ -10,7 +10,19 @@ from typing import Any
 
 from ufl import as_vector, cross, dot, sqrt
 
-__all__ = ["cayley", "compose", "conjugate", "curvature_step", "midway", "rotate", "spin"]
+__all__ = [
+    "cayley",
+    "compose",
+    "conjugate",
+    "curvature",
+    "curvature_factors",
+    "curvature_step",
+    "midway",
+    "relative",
+    "rotate",
+    "spin",
+    "spin_change",
+]
 
 
 def vector_part(q: Any) -> Any:
@@ -49,19 +61,46 @@ def midway(q1: Any, q2: Any) -> Any:
     return s / sqrt(dot(s, s))
 
 
-def curvature_step(q1: Any, q2: Any) -> Any:
-    """Rotation vector from q1 to q2 in the turning frame: 4 arctan(tan(φ/4)) n, without arctan.
-
-    With r = conj(q1) q2, t = vec(r)/(1 + r0) has length tan(φ/4); 4 arctan t is taken as
-    4 t (1 − |t|²/3 + |t|⁴/5), which is monotone and off by φ⁷/28672: 4e-10 rad at φ = 0.2 (and
-    its slope, which the moment works on, by |t|⁶: 2e-8).
-    """
+def relative(q1: Any, q2: Any) -> Any:
+    """Half the turn φ from q1 to q2 in the turning frame: a vector t of length tan(φ/4)."""
     r = compose(conjugate(q1), q2)
-    t = vector_part(r) / (1 + r[0])
-    tt = dot(t, t)
-    return 4 * (1 - tt / 3 + tt * tt / 5) * t
+    return vector_part(r) / (1 + r[0])
+
+
+def curvature(t: Any) -> Any:
+    """Rotation vector φ n of t = tan(φ/4) n, without arctan.
+
+    4 arctan t is taken as 4 p t with p = 1 − |t|²/3 + |t|⁴/5, which is monotone and off by
+    φ⁷/28672: 4e-10 rad at φ = 0.2 (and its slope, which the moment works on, by |t|⁶: 2e-8).
+    """
+    x = dot(t, t)
+    return 4 * _arctan_factor(x) * t
+
+
+def curvature_factors(x: Any) -> tuple[Any, Any]:
+    """α and β in the change of the curvature vector k, δk = k×a + α d + β (t·d) t, at x = t·t.
+
+    a and d are mean and jump of the material spins of the two frames.
+    """
+    p, slope = _arctan_factor(x), -1 / 3 + 2 * x / 5
+    return p * (1 - x), 2 * p + 2 * slope * (1 + x)
+
+
+def _arctan_factor(x: Any) -> Any:
+    return 1 - x / 3 + x * x / 5
+
+
+def curvature_step(q1: Any, q2: Any) -> Any:
+    """Rotation vector from q1 to q2 in the turning frame, see ``curvature``."""
+    return curvature(relative(q1, q2))
 
 
 def spin(theta: Any, rate: Any) -> Any:
     """Material spin of q_n ∘ cayley(θ) when θ changes at a rate: (θ̇ − θ×θ̇/2) / (1 + |θ|²/4)."""
     return (rate - cross(theta, rate) / 2) / (1 + dot(theta, theta) / 4)
+
+
+def spin_change(theta: Any, rate: Any, change: Any, omega: Any, g: Any) -> Any:
+    """Product of g with the change of omega = spin(theta, rate) when θ changes by ``change``."""
+    scale = 1 + dot(theta, theta) / 4
+    return -(dot(cross(g, change), rate) + dot(theta, change) * dot(g, omega)) / (2 * scale)
