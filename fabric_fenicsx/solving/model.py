@@ -210,12 +210,22 @@ class Model:
     def set_time(self, start: float, end: float) -> None:
         """Move the tools to their places at the end of the step and set what depends on Δt."""
         self.time = start
-        self.gravity.value[:] = self._load(end) * self._full_gravity
+        self.set_load(end)
         self.relaxation.value = self.viscosity / (end - start)
         if self.crossings is not None:
             self.crossings.set_step(end - start)
         if self.contacts is not None:
             self.contacts.set_time(start, end)
+
+    def set_load(self, time: float) -> None:
+        """The weight at a time."""
+        self.gravity.value[:] = self._load(time) * self._full_gravity
+
+    def hold_still(self) -> None:
+        """No rates from now on: dashpots and viscosity exert nothing."""
+        self.relaxation.value = 0.0
+        if self.crossings is not None:
+            self.crossings.set_step(float("inf"))
 
     @property
     def moving_supports(self) -> bool:

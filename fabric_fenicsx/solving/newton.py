@@ -138,6 +138,19 @@ class Newton:
             step=self._step,
         )
 
+    def residual(self, x: PETSc.Vec, F: PETSc.Vec, targets: npt.NDArray[np.float64]) -> None:
+        """Residual at the increment x, which stands in the fields; prescribed rows miss theirs."""
+        self.system.residual(F)
+        if len(self._fixed_local):
+            F.array[self._fixed_local] = x.array_r[self._fixed_local] - targets
+
+    def factorised(self) -> PETSc.KSP:
+        """A solver with the tangent at the increment in the fields."""
+        self._jacobian(self.snes, self.x, self._A, self._A)
+        solver = self.snes.getKSP()
+        solver.setOperators(self._A)
+        return solver
+
     def _words(self, reason: int) -> str:
         reasons = PETSc.SNES.ConvergedReason
         if reason > 0:
@@ -158,9 +171,7 @@ class Newton:
             F.set(np.nan)
             return
         self._fresh = False
-        self.system.residual(F)
-        if len(self._fixed_local):
-            F.array[self._fixed_local] = x.array_r[self._fixed_local] - self._target
+        self.residual(x, F, self._target)
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         self.system.tangent(P)

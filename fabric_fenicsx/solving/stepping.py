@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ..errors import SolveError
 from .generalised_alpha import GeneralisedAlpha
 from .newton import Newton, Outcome
-from .update import advance
+from .update import advance_fields
 
 if TYPE_CHECKING:
     from .model import Model
@@ -231,7 +231,7 @@ class Stepper:
         state.previous = w.copy()
         state.previous_step = h
         state.time += h
-        self.net.everywhere(_advance_fields)
+        self.net.everywhere(advance_fields)
 
     def _known_rates(self, m: GeneralisedAlpha, h: float) -> tuple[Array, Array, Array]:
         """v*, a* and the part of w known before the step, h v_n + (1/2 − β) h² a_n."""
@@ -246,9 +246,3 @@ class Stepper:
 def _at_rest(blocks: int) -> State:
     v, vdot, a, previous = (np.zeros((blocks, 6)) for _ in range(4))
     return State(0.0, v, vdot, a, previous)
-
-
-def _advance_fields(fields: Any) -> None:
-    w = fields.w.x.array.reshape(-1, 6)
-    advance(fields.u_n.x.array.reshape(-1, 3), fields.q_n.x.array.reshape(-1, 4), w)
-    w[:] = 0.0

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["advance", "cayley", "compose", "rotate"]
+__all__ = ["advance", "advance_fields", "cayley", "compose", "rotate"]
 
 Array = npt.NDArray[np.float64]
 
@@ -37,3 +39,10 @@ def advance(u: Array, q: Array, w: Array) -> None:
     u += w[:, :3]
     q[:] = compose(q, cayley(w[:, 3:]))
     q /= np.linalg.norm(q, axis=1)[:, None]
+
+
+def advance_fields(fields: Any) -> None:
+    """Make the increment of mechanics.fields' tows or connectors part of their accepted state."""
+    w = fields.w.x.array.reshape(-1, 6)
+    advance(fields.u_n.x.array.reshape(-1, 3), fields.q_n.x.array.reshape(-1, 4), w)
+    w[:] = 0.0
