@@ -169,8 +169,6 @@ def _repeat_row(table: Table) -> None:
 
 # Makes a folder beside itself if a loader runs what a tag asks for.
 PYTHON_TAG = "title: !!python/object/apply:os.mkdir ['{}']\n"
-    "title: !!python/object/apply:pathlib.Path.touch [!!python/object/apply:pathlib.Path ['{}']]\n"
-)
 EXECUTED = "executed"
 
 

@@ -190,5 +190,5 @@ LISTED = {
 
 
 def make(rng: np.random.Generator, scales: Scales, name: str, form: str) -> Effect:
-    """An effect of the list of DATA by its name and form."""
+    """A listed effect by its name and form."""
     return LISTED[name][0](rng, scales, form)
