@@ -30,6 +30,8 @@ class Term:
         energy: stored energy [N mm], if it has one.
         loss: energy lost over the step [N mm], if it dissipates: force times change, the force
             being that at the end of the step.
+        symmetric: whether the tangent is, with what makes it unsymmetric being negligible; a
+            model of such terms only is factorised at half the cost.
     """
 
     name: str
@@ -38,14 +40,14 @@ class Term:
     tangent: Any
     energy: Any | None = None
     loss: Any | None = None
+    symmetric: bool = False
 
 
 def energy_term(name: str, fields: TowFields | ConnectorFields, energy: Any) -> Term:
     """A conservative effect from its energy: residual and tangent by differentiation."""
     residual = derivative(energy, fields.w, fields.test)
-    return Term(
-        name, _where(fields), residual, derivative(residual, fields.w, fields.trial), energy
-    )
+    tangent = derivative(residual, fields.w, fields.trial)
+    return Term(name, _where(fields), residual, tangent, energy, symmetric=True)
 
 
 def work_term(
@@ -55,11 +57,13 @@ def work_term(
     tangent: Any | None = None,
     energy: Any | None = None,
     loss: Any | None = None,
+    *,
+    symmetric: bool = False,
 ) -> Term:
     """An effect from its virtual work; the tangent is its derivative unless another is given."""
     if tangent is None:
         tangent = derivative(residual, fields.w, fields.trial)
-    return Term(name, _where(fields), residual, tangent, energy, loss)
+    return Term(name, _where(fields), residual, tangent, energy, loss, symmetric)
 
 
 def _where(fields: TowFields | ConnectorFields) -> Where:

@@ -134,9 +134,8 @@ class ArcLength:
                 return None
             if iteration and norm < self._tolerance and abs(off) < 1e-8 * length**2:
                 return Point(factor, iteration, length)
-            solver = self._newton.factorised()
-            of_load = residual.duplicate()
-            solver.solve(self._load_rate(factor, residual), of_load)
+            solve = self._newton.factorised()
+            of_load = solve(self._load_rate(factor, residual))
             v = self._moved(of_load)
             if iteration == 0:
                 # On in the direction of the last step; at first with the load.
@@ -146,8 +145,7 @@ class ArcLength:
                 change = math.copysign(length, ahead) / math.sqrt(self._dot(v, v) + psi)
                 w.axpy(change, of_load)
             else:
-                of_residual = residual.duplicate()
-                solver.solve(-residual, of_residual)
+                of_residual = solve(-residual)
                 r = self._moved(of_residual)
                 slope = 2.0 * (self._dot(u, v) + psi * moved)
                 change = -(off + 2.0 * self._dot(u, r)) / slope

@@ -153,6 +153,7 @@ class Model:
                 beam.beam_tangent(tows, self.law),
                 beam.strain_energy(tows, self.elastic.energy),
                 beam.viscous_loss(tows, self.relaxation, self.elastic.at_zero),
+                symmetric=True,
             )
         ]
         if np.any(self._full_gravity):
@@ -160,7 +161,8 @@ class Model:
         if self.alpha is not None:
             work = inertia.inertia(tows, self.c_0, self.c_1, self.mass_scale)
             kinetic = inertia.kinetic_energy(tows, self.c_1, self.mass_scale)
-            terms.append(work_term("inertia", tows, work, energy=kinetic))
+            # Unsymmetric is only what the tiny rotary inertia of a turning section does.
+            terms.append(work_term("inertia", tows, work, energy=kinetic, symmetric=True))
         return terms
 
     def _number(self, supports: Sequence[Support]) -> None:

@@ -40,7 +40,7 @@ class Outcome:
 
 
 class Newton:
-    """One SNES for a whole run.
+    """One SNES for a whole run, or two where moments on nodes come and go.
 
     Args:
         system: what to solve.
@@ -68,27 +68,43 @@ class Newton:
         self.iterations = 0
         self.factorisations = 0
         self.solve_seconds = 0.0
+        self._dyads = list(dyads)
+        self._prefix = prefix
         net = system.net
         self.x = net.vector()
-        self._F = net.vector()
-        self._A = net.matrix()
+        self._F, self._free, self._held = net.vector(), net.vector(), net.vector()
         first = int(net.global_blocks[0]) * 6 if net.owned else 0
-        self._fixed_global = np.asarray(fixed, dtype=PETSc.IntType)
-        self._fixed_local = self._fixed_global - first
+        self._fixed = np.asarray(fixed, dtype=PETSc.IntType) - first
+        self._held.array[self._fixed] = 1.0
+        self._free.set(1.0)
+        self._free.axpy(-1.0, self._held)
         self._target = np.zeros(len(fixed))
         self._history: list[float] = []
         self._fresh = True
         self._refused = ""
+        self._solvers: dict[bool, PETSc.SNES] = {}
+        self._whole: dict[bool, PETSc.Mat] = {}
 
+    @property
+    def snes(self) -> PETSc.SNES:
+        """The solver for a tangent as symmetric as the present one. Collective."""
+        symmetric = self.system.symmetric
+        if symmetric not in self._solvers:
+            self._solvers[symmetric] = self._solver(symmetric)
+        return self._solvers[symmetric]
+
+    def _solver(self, symmetric: bool) -> PETSc.SNES:
+        net = self.system.net
+        prefix = self._prefix + ("symmetric_" if symmetric else "")
         snes = PETSc.SNES().create(net.comm)
         snes.setOptionsPrefix(prefix)
         options = PETSc.Options()
         for key, value in {
+            "pc_type": "cholesky" if symmetric else "lu",
             "snes_type": "newtonls",
             "snes_linesearch_type": "basic",
             "snes_divergence_tolerance": -1,
             "ksp_type": "preonly",
-            "pc_type": "lu",
             "pc_factor_mat_solver_type": "mumps",
             # Orderings found best on these nets: AMD on one rank, AMF on several.
             "mat_mumps_icntl_7": 0 if net.comm.size == 1 else 2,
@@ -97,16 +113,18 @@ class Newton:
             if not options.hasName(prefix + key):
                 options[prefix + key] = value
         snes.setFunction(self._function, self._F)
-        snes.setJacobian(self._jacobian, self._A)
+        A = self._whole[symmetric] = net.matrix(symmetric=symmetric)
+        # A matrix has its pattern once it has been filled.
+        self.system.tangent(A)
+        snes.setJacobian(self._jacobian, A.duplicate())
         snes.setConvergenceTest(self._test)
         snes.setFromOptions()
-        snes.setTolerances(max_it=limit)
-        if dyads:
-            self._dyads = list(dyads)
+        snes.setTolerances(max_it=self.limit)
+        if self._dyads:
             pc = snes.getKSP().getPC()
             pc.setType(PETSc.PC.Type.PYTHON)
             pc.setPythonContext(DyadicLU(self._free_dyads, prefix))
-        self.snes = snes
+        return snes
 
     def solve(self, targets: npt.NDArray[np.float64]) -> Outcome:
         """Solve for the increment, starting from the values in ``x``.
@@ -123,11 +141,12 @@ class Newton:
         self._refused = ""
         start = perf_counter()
         before = self.system.assemble_seconds
-        self.snes.solve(None, self.x)
+        snes = self.snes
+        snes.solve(None, self.x)
         self.solve_seconds += perf_counter() - start - (self.system.assemble_seconds - before)
-        done = self.snes.getIterationNumber()
+        done = snes.getIterationNumber()
         self.iterations += done
-        reason = self.snes.getConvergedReason()
+        reason = snes.getConvergedReason()
         if reason > 0:
             self.system.set_increment(self.x)
         return Outcome(
@@ -141,15 +160,23 @@ class Newton:
     def residual(self, x: PETSc.Vec, F: PETSc.Vec, targets: npt.NDArray[np.float64]) -> None:
         """Residual at the increment x, which stands in the fields; prescribed rows miss theirs."""
         self.system.residual(F)
-        if len(self._fixed_local):
-            F.array[self._fixed_local] = x.array_r[self._fixed_local] - targets
+        F.array[self._fixed] = x.array_r[self._fixed] - targets
 
-    def factorised(self) -> PETSc.KSP:
-        """A solver with the tangent at the increment in the fields."""
-        self._jacobian(self.snes, self.x, self._A, self._A)
-        solver = self.snes.getKSP()
-        solver.setOperators(self._A)
-        return solver
+    def factorised(self) -> Callable[[PETSc.Vec], PETSc.Vec]:
+        """Solves with the tangent at the increment in the fields, from right-hand sides."""
+        snes = self.snes
+        P = snes.getJacobian()[1]
+        self._tangent(P)
+        solver = snes.getKSP()
+        solver.setOperators(P)
+
+        def solve(b: PETSc.Vec) -> PETSc.Vec:
+            right, y = b.copy(), b.duplicate()
+            self._take_prescribed(right)
+            solver.solve(right, y)
+            return y
+
+        return solve
 
     def _words(self, reason: int) -> str:
         reasons = PETSc.SNES.ConvergedReason
@@ -174,16 +201,39 @@ class Newton:
         self.residual(x, F, self._target)
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
-        self.system.tangent(P)
-        # Columns are kept, so that the prescribed motion enters through the linear solve.
-        P.zeroRows(self._fixed_global, diag=1.0)
+        self._tangent(P)
+        # SNES solves with the residual as it stands here.
+        self._take_prescribed(self._F)
+
+    def _tangent(self, P: PETSc.Mat) -> None:
+        """Assemble the tangent and copy it to P, with one on the diagonal for prescribed rows.
+
+        Their columns go too, so that P is symmetric; what they do is in ``_take_prescribed``.
+        """
+        A = self._whole[self.system.symmetric]
+        self.system.tangent(A)
+        A.copy(P, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        P.diagonalScale(self._free, self._free)
+        P.setDiagonal(self._held, PETSc.InsertMode.ADD_VALUES)
         self.factorisations += 1
+
+    def _take_prescribed(self, b: PETSc.Vec) -> None:
+        """Take off a right-hand side what the prescribed rows' solution, b itself, does to others.
+
+        So prescribed motion enters through the linear solve.
+        """
+        moved, force = b.duplicate(), b.duplicate()
+        moved.pointwiseMult(self._held, b)
+        if moved.norm(PETSc.NormType.NORM_INFINITY) > 0.0:
+            self._whole[self.system.symmetric].mult(moved, force)
+            force.pointwiseMult(force, self._free)
+            b.axpy(-1.0, force)
 
     def _free_dyads(self) -> list[Dyad]:
         """The dyads, without the rows whose increment is prescribed."""
         found = [dyad for dyad in (make() for make in self._dyads) if dyad is not None]
         for column, _, _ in found:
-            column.array[self._fixed_local] = 0.0
+            column.array[self._fixed] = 0.0
         return found
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:

@@ -115,10 +115,12 @@ class Crossings:
             work = crossover.turning_work(fields, moment, gamma)
             if piece is turning[0]:
                 energy = crossover.rotational_energy(fields, number(law.k1), number(law.k3))
-                self.terms.append(work_term(piece.name, fields, work, energy=energy))
+                self.terms.append(
+                    work_term(piece.name, fields, work, energy=energy, symmetric=True)
+                )
             else:
                 loss = crossover.turning_loss(fields, moment, at.change)
-                self.terms.append(work_term(piece.name, fields, work, loss=loss))
+                self.terms.append(work_term(piece.name, fields, work, loss=loss, symmetric=True))
             for name, value in piece.history(at).items():
                 remembered.append((f"{piece.name}: {name}", past(name), value))
         self._remember(histories, remembered)

@@ -22,13 +22,16 @@ __all__ = ["System"]
 
 Array = npt.NDArray[np.float64]
 
+MESHES = ("tows", "crossovers")
+
 
 class System:
     """All terms of a model, compiled, and how to assemble them.
 
     Args:
         net: the discretised net.
-        terms: the model; their forms are compiled here (collective, slow on a first run).
+        terms: the model; their sums are compiled here (collective, slow on a first run), the parts
+            of a single term when they are asked for.
         law: the section law of the beam term, for the forces that its tangent needs.
 
     Attributes:
@@ -43,37 +46,17 @@ class System:
     ) -> None:
         self.net = net
         self.terms = list(terms)
-        comm = net.comm
-        here = {"tows": True, "crossovers": net.connectors is not None}
-        with_crossings = {"tows": True, "crossovers": len(net.net.crossings) > 0}
-        self._residuals: dict[str, list[Any]] = {"tows": [], "crossovers": []}
-        self._tangents: dict[str, list[Any]] = {"tows": [], "crossovers": []}
-        self._energies: dict[str, Any] = {}
-        self._losses: dict[str, Any] = {}
-        self._term_residuals: dict[str, Any] = {}
-        for term in self.terms:
-            if not with_crossings[term.where]:
-                continue
-            own = here[term.where]
-            residual = _dolfinx.compile_form(term.residual, comm, here=own)
-            self._residuals[term.where].append(residual)
-            self._term_residuals[term.name] = residual
-            # A rank without crossings has no forms of them, but must wait for those that have.
-            forms = (term.tangent, term.energy, term.loss)
-            some = comm.allgather([form is not None for form in forms])
-            has_tangent, has_energy, has_loss = (any(flags) for flags in zip(*some, strict=True))
-            if has_tangent:
-                self._tangents[term.where].append(
-                    _dolfinx.compile_form(term.tangent, comm, here=own)
-                )
-            if has_energy:
-                self._energies[term.name] = _dolfinx.compile_form(term.energy, comm, here=own)
-            if has_loss:
-                self._losses[term.name] = _dolfinx.compile_form(term.loss, comm, here=own)
+        self._by_name = {term.name: term for term in self.terms}
+        self._forms: dict[tuple[str, str], Any] = {}
+        # One kernel call and one insertion per cell for all terms of a mesh.
+        self._residuals = {mesh: self._sum("residual", mesh) for mesh in MESHES}
+        self._tangents = {mesh: self._sum("tangent", mesh) for mesh in MESHES}
+        with_tangent = [term for term in self.terms if term.tangent is not None]
+        self._symmetric = all(net.comm.allgather(all(term.symmetric for term in with_tangent)))
         tows = net.tows
         self._dw = Function(tows.space)
         self._forces = _dolfinx.compile_form(
-            linearised_forces(tows, self._dw, net.forces_space, law), comm
+            linearised_forces(tows, self._dw, net.forces_space, law), net.comm
         )
         self.nodal_loads = np.zeros((len(net.local_nodes), BLOCK))
         self.refresh: list[Callable[[], None]] = []
@@ -87,6 +70,32 @@ class System:
         self._to_connectors = PETSc.Scatter().create(
             self._x, connectors, self._connector_values, None
         )
+
+    def _sum(self, part: str, mesh: str) -> Any:
+        """The compiled sum of one part of all terms on a mesh; None without any. Collective."""
+        parts = [getattr(term, part) for term in self.terms if term.where == mesh]
+        forms = [form for form in parts if form is not None]
+        return self._compile(sum(forms[1:], start=forms[0]) if forms else None)
+
+    def _compile(self, form: Any | None) -> Any:
+        """Compile a form; a rank without cells for it has None. Collective."""
+        comm = self.net.comm
+        if not any(comm.allgather(form is not None)):
+            return None
+        return _dolfinx.compile_form(form, comm, here=form is not None)
+
+    def _part(self, part: str, term: Term) -> Any:
+        """One part of one term, compiled when it is first asked for. Collective."""
+        key = (part, term.name)
+        if key not in self._forms:
+            self._forms[key] = self._compile(getattr(term, part))
+        return self._forms[key]
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the tangent is symmetric; a moment on a node makes it unsymmetric. Collective."""
+        turning = bool(self.nodal_loads[: self.net.owned, 3:].any())
+        return self._symmetric and not any(self.net.comm.allgather(turning))
 
     def set_increment(self, x: PETSc.Vec, *, linearise_from: str | None = None) -> None:
         """Copy x into w on all meshes; ``linearise_from`` updates the tangent's section forces.
@@ -126,14 +135,12 @@ class System:
         own = net.owned * BLOCK
         local = self._local
         local[:] = 0.0
-        for form in self._residuals["tows"]:
-            _dolfinx.add_vector(local, form)
+        _dolfinx.add_vector(local, self._residuals["tows"])
         local[:own] -= self._load_work()[0].ravel()
         net.put(local, F)
         if net.connectors is not None:
             values = np.zeros(len(net.connector_rows))
-            for form in self._residuals["crossovers"]:
-                _dolfinx.add_vector(values, form)
+            _dolfinx.add_vector(values, self._residuals["crossovers"])
             F.setValues(net.connector_rows, values, addv=PETSc.InsertMode.ADD_VALUES)
         F.assemble()
         self.assemble_seconds += perf_counter() - start
@@ -143,8 +150,7 @@ class System:
         start = perf_counter()
         A.zeroEntries()
         A.setLGMap(self._lg_tows, self._lg_tows)
-        for form in self._tangents["tows"]:
-            _dolfinx.add_matrix(A, form)
+        _dolfinx.add_matrix(A, self._tangents["tows"])
         turning = np.flatnonzero(self.nodal_loads[: self.net.owned, 3:].any(axis=1))
         if len(turning):
             rates = self._load_work()[1]
@@ -156,8 +162,7 @@ class System:
         A.assemble(PETSc.Mat.AssemblyType.FLUSH)
         A.setLGMap(self._lg_crossovers, self._lg_crossovers)
         if self.net.connectors is not None:
-            for form in self._tangents["crossovers"]:
-                _dolfinx.add_matrix(A, form)
+            _dolfinx.add_matrix(A, self._tangents["crossovers"])
         A.assemble()
         self.assemble_seconds += perf_counter() - start
 
@@ -183,25 +188,28 @@ class System:
 
     def energies(self) -> dict[str, float]:
         """Stored energy of each term that has one [N mm], summed over the ranks."""
-        return self._summed(self._energies)
+        return self._summed("energy")
 
     def losses(self) -> dict[str, float]:
         """Energy that each dissipative term has lost over the step [N mm], over all ranks."""
-        return self._summed(self._losses)
+        return self._summed("loss")
 
-    def _summed(self, functionals: dict[str, Any]) -> dict[str, float]:
-        own = np.array(
-            [0.0 if form is None else _dolfinx.cell_scalar(form) for form in functionals.values()]
-        )
+    def _summed(self, part: str) -> dict[str, float]:
+        comm = self.net.comm
+        # A rank without crossings has no forms of them.
+        having = comm.allgather([t.name for t in self.terms if getattr(t, part) is not None])
+        names = max(having, key=len)
+        forms = [self._part(part, self._by_name[name]) for name in names]
+        own = np.array([0.0 if form is None else _dolfinx.cell_scalar(form) for form in forms])
         total = np.zeros_like(own)
-        self.net.comm.Allreduce(own, total)
-        return dict(zip(functionals, total.tolist(), strict=True))
+        comm.Allreduce(own, total)
+        return dict(zip(names, total.tolist(), strict=True))
 
     def term_forces(self, name: str) -> Array:
         """Nodal forces of one tow term (the negative is what it exerts), (n_owned, 6) [N, N mm]."""
         net = self.net
         local = np.zeros(len(net.rows))
-        _dolfinx.add_vector(local, self._term_residuals[name])
+        _dolfinx.add_vector(local, self._part("residual", self._by_name[name]))
         return net.summed(local).array_r.copy().reshape(-1, BLOCK)
 
     def section_forces(self) -> Array:
