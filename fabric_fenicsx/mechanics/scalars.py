@@ -1,4 +1,4 @@
-"""UFL of scalars on numpy arrays: laws of one crossing without a mesh and without a compiler.
+"""UFL of scalars on numpy arrays: laws of one crossing without a mesh.
 
 A law of mechanics.shear_laws is an expression in γ, γ̇ and numbers. Here the same expression, with
 symbols in their place, becomes a function of arrays; its derivatives in any symbol are UFL's.
@@ -7,6 +7,7 @@ symbols in their place, becomes a function of arrays; its derivatives in any sym
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from ufl.algorithms.apply_derivatives import apply_derivatives
 from ufl.classes import Label, ScalarValue, Variable, Zero
 from ufl.corealg.traversal import unique_post_traversal
 
-__all__ = ["derivative_of", "numpy_function", "symbol"]
+__all__ = ["Steps", "derivative_of", "numpy_function", "steps_of", "symbol"]
 
 OPERATORS: dict[str, Callable[..., Any]] = {
     "Sum": np.add,
@@ -64,57 +65,77 @@ def derivative_of(expression: Any, by: Any) -> Any:
     return apply_derivatives(apply_algebra_lowering(diff(as_ufl(expression), by)))
 
 
-def numpy_function(
-    expressions: Sequence[Any], symbols: Mapping[str, Any]
-) -> Callable[[Mapping[str, Any]], list[Any]]:
-    """A function that evaluates scalar expressions; what they share is evaluated once.
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """Expressions as single operations, what they share done once.
+
+    Attributes:
+        operations: name of the operator and numbers of the values it takes, for each value. A
+            given value is ("given", its name), a number ("number", it).
+        results: number of the value of each expression.
+    """
+
+    operations: list[tuple[str, Any]]
+    results: list[int]
+
+
+def steps_of(expressions: Sequence[Any], symbols: Mapping[str, Any]) -> Steps:
+    """Take expressions of scalars apart.
 
     Args:
         expressions: in the symbols, numbers and operators of UFL.
         symbols: by the name under which their values are passed.
-
-    Returns:
-        Takes values by name, numbers or arrays that broadcast, and gives one value for each
-        expression, a number where it depends on none of the arrays.
 
     Raises:
         ValueError: an operator that is none of scalars, or a symbol without a name.
     """
     inputs = {value.ufl_operands[1]: name for name, value in symbols.items()}
     place: dict[Any, int] = {}
-    known: list[Any] = []
-    given: list[tuple[int, str]] = []
-    steps: list[tuple[int, Callable[..., Any], list[int]]] = []
+    operations: list[tuple[str, Any]] = []
     results = []
     for expression in expressions:
         lowered = apply_derivatives(apply_algebra_lowering(as_ufl(expression)))
         for node in unique_post_traversal(lowered):
             if node in place or isinstance(node, Label):
                 continue
-            k = place[node] = len(known)
-            known.append(None)
+            place[node] = len(operations)
             kind = type(node).__name__
             if isinstance(node, Variable):
                 if node.ufl_operands[1] not in inputs:
                     raise ValueError("a symbol without a name in an expression of scalars")
-                given.append((k, inputs[node.ufl_operands[1]]))
+                operations.append(("given", inputs[node.ufl_operands[1]]))
             elif isinstance(node, Zero):
-                known[k] = 0.0
+                operations.append(("number", 0.0))
             elif isinstance(node, ScalarValue):
-                known[k] = float(node)
+                operations.append(("number", float(node)))
             elif kind in OPERATORS:
-                operands = [place[operand] for operand in node.ufl_operands]
-                steps.append((k, OPERATORS[kind], operands))
+                operations.append((kind, [place[operand] for operand in node.ufl_operands]))
             else:
                 raise ValueError(f"{kind} in an expression of scalars")
         results.append(place[lowered])
+    return Steps(operations, results)
+
+
+def numpy_function(
+    expressions: Sequence[Any], symbols: Mapping[str, Any]
+) -> Callable[[Mapping[str, Any]], list[Any]]:
+    """A function that evaluates scalar expressions; see steps_of.
+
+    Returns:
+        Takes values by name, numbers or arrays that broadcast, and gives one value for each
+        expression, a number where it depends on none of the arrays.
+    """
+    steps = steps_of(expressions, symbols)
 
     def evaluate(at: Mapping[str, Any]) -> list[Any]:
-        values = known.copy()
-        for k, name in given:
-            values[k] = at[name]
-        for k, operator, operands in steps:
-            values[k] = operator(*[values[i] for i in operands])
-        return [values[k] for k in results]
+        values: list[Any] = []
+        for operator, operands in steps.operations:
+            if operator == "given":
+                values.append(at[operands])
+            elif operator == "number":
+                values.append(operands)
+            else:
+                values.append(OPERATORS[operator](*[values[i] for i in operands]))
+        return [values[k] for k in steps.results]
 
     return evaluate

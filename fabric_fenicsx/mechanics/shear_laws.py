@@ -3,8 +3,8 @@
 Each law is a small frozen object with a ``moment``: an expression in the shear angle γ at the end
 of the step, its value γ_n at the start, Δt and, if the law remembers, history values per crossing.
 A law of one's own is a class with ``name``, ``moment`` and ``history`` in any file; nothing here
-needs to know of it. Laws are odd: a crossing does not know which way it is sheared. Moments are in
-N mm.
+needs to know of it. Laws of the weave are odd: a crossing does not know which way it is sheared.
+Moments are in N mm.
 """
 
 from __future__ import annotations
@@ -15,18 +15,21 @@ from itertools import pairwise
 from typing import Any, Protocol
 
 from scipy.interpolate import PchipInterpolator
-from ufl import conditional, exp, ge, gt, lt, max_value, min_value
+from ufl import conditional, exp, ge, lt, max_value, min_value, sqrt
 
 __all__ = [
     "CoulombFriction",
     "Crossing",
     "DahlFriction",
+    "EvenSpring",
+    "ExponentialLocking",
     "LinearDashpot",
     "Locking",
     "Maxwell",
     "PolynomialSpring",
     "PowerDashpot",
     "ShearLaw",
+    "SlidingFriction",
     "TabulatedDashpot",
     "TabulatedSpring",
 ]
@@ -277,22 +280,96 @@ class DahlFriction:
 
 
 @dataclass(frozen=True, slots=True)
+class SlidingFriction:
+    """M = m_c γ̇/√(γ̇² + v²): Coulomb friction that does not stick, so that a hold has none.
+
+    Attributes:
+        limit: m_c [N mm].
+        floor: v [rad/s], well below the rates of interest.
+    """
+
+    limit: float
+    floor: float = 1e-5
+    name: str = "sliding friction"
+
+    def moment(self, at: Crossing) -> Any:
+        """The rounded sign of the rate."""
+        return at.number(self.limit) * at.rate / sqrt(at.rate**2 + at.number(self.floor) ** 2)
+
+    def history(self, at: Crossing) -> dict[str, Any]:
+        """None."""
+        return {}
+
+
+@dataclass(frozen=True, slots=True)
+class EvenSpring:
+    """M = k |γ|^p on both sides: a frame that stretches the tows whichever way it shears.
+
+    The one elastic law that is not odd: it belongs to a rig and its clamps, not to the weave.
+
+    Attributes:
+        stiffness: k [N mm].
+        power: p >= 1.
+    """
+
+    stiffness: float
+    power: int = 2
+    name: str = "even spring"
+
+    def moment(self, at: Crossing) -> Any:
+        """The power of |γ|."""
+        return at.number(self.stiffness) * _size(at.gamma) ** self.power
+
+    def history(self, at: Crossing) -> dict[str, Any]:
+        """None."""
+        return {}
+
+
+@dataclass(frozen=True, slots=True)
 class Locking:
-    """Tows meet side by side: M = k (|γ| − γ_L)² beyond the locking angle, continuous in its slope.
+    """Tows meet side by side: M = k (|γ| − γ_L)^p beyond the locking angle.
 
     Attributes:
         angle: γ_L [rad].
         stiffness: k [N mm].
+        power: p; from 2 on the slope is continuous.
     """
 
     angle: float
     stiffness: float
+    power: int = 2
     name: str = "locking"
 
     def moment(self, at: Crossing) -> Any:
         """Zero below γ_L."""
-        beyond = at.number(self.stiffness) * (_size(at.gamma) - at.number(self.angle)) ** 2
-        beyond = conditional(gt(_size(at.gamma), at.number(self.angle)), beyond, 0)
+        past_it = max_value(_size(at.gamma) - at.number(self.angle), 0)
+        beyond = at.number(self.stiffness) * past_it**self.power
+        return conditional(ge(at.gamma, 0), beyond, -beyond)
+
+    def history(self, at: Crossing) -> dict[str, Any]:
+        """None."""
+        return {}
+
+
+@dataclass(frozen=True, slots=True)
+class ExponentialLocking:
+    """M = m (exp((|γ| − γ_L)/s) − 1) beyond the locking angle, stiffening by e every s.
+
+    Attributes:
+        angle: γ_L [rad].
+        moment_scale: m [N mm].
+        scale: s [rad].
+    """
+
+    angle: float
+    moment_scale: float
+    scale: float
+    name: str = "exponential locking"
+
+    def moment(self, at: Crossing) -> Any:
+        """Zero below γ_L."""
+        past_it = max_value(_size(at.gamma) - at.number(self.angle), 0)
+        beyond = at.number(self.moment_scale) * (exp(past_it / at.number(self.scale)) - 1)
         return conditional(ge(at.gamma, 0), beyond, -beyond)
 
     def history(self, at: Crossing) -> dict[str, Any]:

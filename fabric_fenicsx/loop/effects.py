@@ -1,0 +1,151 @@
+"""What a model may lack: effects with a name, parameters, and one or more forms.
+
+An effect has an amplitude that is zero in the baseline. Where a name stands for a kind of behaviour
+rather than one formula (friction, locking), it has several variants, and the data choose.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+
+__all__ = ["Effect", "FrameVariant", "Parameter", "StripVariant", "Variant", "read_effects"]
+
+Values = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A number to be fitted.
+
+    Attributes:
+        name: with its unit at the end, as k1_N.
+        starts: values from which a fit is begun; for an amplitude none are needed, as the model
+            is all but linear in it.
+        lower, upper: bounds.
+        amplitude: whether it is the strength of an effect, zero in the baseline.
+        meaning: one line for the report.
+        share_of: "duration", "angle" or "rate": starts and bounds are shares of the longest run,
+            of the largest shear angle or of the largest rate in the data.
+    """
+
+    name: str
+    starts: tuple[float, ...] = ()
+    lower: float = -float("inf")
+    upper: float = float("inf")
+    amplitude: bool = False
+    meaning: str = ""
+    share_of: str = ""
+
+    @property
+    def one_sided(self) -> bool:
+        """An amplitude that cannot be negative."""
+        return self.amplitude and self.lower == 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One form of an effect.
+
+    Attributes:
+        label: what tells it from the others of its effect.
+        parameters: its numbers, amplitudes first.
+    """
+
+    label: str
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def amplitudes(self) -> tuple[Parameter, ...]:
+        """The strengths."""
+        return tuple(p for p in self.parameters if p.amplitude)
+
+    @property
+    def shapes(self) -> tuple[Parameter, ...]:
+        """The other numbers."""
+        return tuple(p for p in self.parameters if not p.amplitude)
+
+    def grid(self) -> list[dict[str, float]]:
+        """Every combination of the starts of its shapes."""
+        names = [p.name for p in self.shapes]
+        return [
+            dict(zip(names, starts, strict=True))
+            for starts in product(*(p.starts for p in self.shapes))
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class FrameVariant(Variant):
+    """An effect in a picture frame, as expressions in UFL of its parameters.
+
+    Attributes:
+        laws: shear laws (mechanics.shear_laws) whose moments per area of fabric [N] add.
+        travel: true crosshead displacement [mm] from an object with ``D`` [mm] and ``past`` (the
+            true displacement at the reading before).
+        reading: what the load cell adds [N] at the time t [s].
+        remembers_travel: ``travel`` depends on ``past``.
+    """
+
+    laws: Callable[[Values], tuple[Any, ...]] | None = None
+    travel: Callable[[Values, Any, Any], Any] | None = None
+    reading: Callable[[Values, Any], Any] | None = None
+    remembers_travel: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class StripVariant(Variant):
+    """An effect in a cantilever, as expressions in UFL of its parameters.
+
+    Attributes:
+        moment: bending moment per width [N mm/mm] added to B κ, of the curvature κ [1/mm].
+        slope: turn of the root [rad], of the moment per width there [N mm/mm].
+    """
+
+    moment: Callable[[Values, Any], Any] | None = None
+    slope: Callable[[Values, Any], Any] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """A kind of behaviour that a model may lack.
+
+    Attributes:
+        name: as in reports.
+        test: which test shows it.
+        meaning: one line.
+        variants: its forms.
+    """
+
+    name: str
+    test: str
+    meaning: str
+    variants: Sequence[Variant]
+
+
+def read_effects(path: Path) -> list[Effect]:
+    """A user's own effects, from the list ``EFFECTS`` of a Python file. It is run.
+
+    Raises:
+        InputError: the file cannot be run or has no such list.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, allowed is a Python file with a list EFFECTS")
+    spec = importlib.util.spec_from_file_location(f"effects_of_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{path}: no Python file, allowed is a name that ends in .py")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(f"{path}: {reason}") from error
+    effects = getattr(module, "EFFECTS", None)
+    if not isinstance(effects, (list, tuple)) or not all(isinstance(e, Effect) for e in effects):
+        raise InputError(f"{path}: EFFECTS: missing, allowed is a list of loop.effects.Effect")
+    return list(effects)

@@ -1,0 +1,96 @@
+"""What the search for effects needs to know of a test: its readings and a model of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from .effects import Effect, Parameter, Variant
+
+__all__ = ["Experiment", "Readings"]
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """All readings of a test, in the order of its runs.
+
+    Attributes:
+        observed: of the quantity that is compared, (n,).
+        run: number of the run, (n,).
+        holdout: may only be used to report an error, (n,).
+        usable: false where the model cannot say what to expect, as at a corner of the motion, (n,).
+        weight: 1 over the given sigma of a reading relative to the others, (n,); ones by default.
+        names: of the runs.
+        covariates: what the residual is shown against, by name with unit, each (n,).
+    """
+
+    observed: Array
+    run: npt.NDArray[np.int64]
+    holdout: Flags
+    usable: Flags
+    weight: Array
+    names: tuple[str, ...]
+    covariates: Mapping[str, Array]
+
+    @property
+    def fit(self) -> Flags:
+        """Readings that may be used for anything."""
+        return ~self.holdout & self.usable
+
+
+class Experiment(Protocol):
+    """A test with a baseline model and effects that can be added to it."""
+
+    @property
+    def test(self) -> str:
+        """Its name."""
+        ...
+
+    @property
+    def quantity(self) -> str:
+        """What is compared, with its unit."""
+        ...
+
+    @property
+    def noise(self) -> float | None:
+        """One sigma of a reading where it is given."""
+        ...
+
+    @property
+    def readings(self) -> Readings:
+        """The data."""
+        ...
+
+    @property
+    def baseline(self) -> tuple[Parameter, ...]:
+        """Parameters of the baseline; each has one start."""
+        ...
+
+    @property
+    def effects(self) -> Sequence[Effect]:
+        """The candidates, their starts and bounds fitted to the data."""
+        ...
+
+    def predict(
+        self, variants: Sequence[Variant], values: Mapping[str, float]
+    ) -> tuple[Array, dict[str, Array]]:
+        """Expected readings, and their derivative in every parameter.
+
+        Args:
+            variants: the effects in the model, at most one of each name of a parameter.
+            values: of the parameters of the baseline and of the variants.
+
+        Returns:
+            The readings, (n,), and by parameter their derivative, (n,).
+
+        Raises:
+            SolveError: the model has no solution there.
+        """
+        ...

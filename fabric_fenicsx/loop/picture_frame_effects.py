@@ -1,0 +1,231 @@
+"""Effects that a picture frame shows. Moments are per area of fabric [N mm/mm² = N].
+
+A slip angle γ_s stands for a stiffness m_c/γ_s, so that every form is proportional to its
+amplitude.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ufl import as_ufl, conditional, gt, max_value, min_value
+
+from ..mechanics.shear_laws import (
+    CoulombFriction,
+    DahlFriction,
+    EvenSpring,
+    ExponentialLocking,
+    Locking,
+    Maxwell,
+    PowerDashpot,
+    SlidingFriction,
+)
+from .effects import Effect, FrameVariant, Parameter, Values
+
+__all__ = ["PICTURE_FRAME_EFFECTS"]
+
+LIMIT = Parameter("m_c_N", lower=0.0, amplitude=True, meaning="friction moment per area")
+SLIP = Parameter(
+    "slip_angle_rad", (0.003, 0.015, 0.05), 1e-4, 0.3, meaning="shear until the friction slides"
+)
+ROUNDING = Parameter(
+    "rounding_rad_s",
+    (1e-3, 0.1),
+    1e-4,
+    1.0,
+    meaning="rate below which the friction falls off",
+    share_of="rate",
+)
+LOCKING_ANGLE = Parameter(
+    "locking_angle_rad",
+    (0.4, 0.55, 0.7, 0.8, 0.9),
+    0.1,
+    0.99,
+    meaning="shear angle where locking begins",
+    share_of="angle",
+)
+OFFSET = Parameter("offset_N", amplitude=True, meaning="reading at no load")
+DRIFT = Parameter("drift_N_s", amplitude=True, meaning="change of the reading per second")
+TRAVEL = Parameter(
+    "free_travel_mm", lower=0.0, amplitude=True, meaning="crosshead travel before engagement"
+)
+
+
+def _slack(p: Values, D: Any, past: Any) -> Any:
+    return max_value(D - p["free_travel_mm"], 0) + min_value(D, 0)
+
+
+def _dead_zone(p: Values, D: Any, past: Any) -> Any:
+    free = p["free_travel_mm"]
+    return max_value(D - free, 0) + min_value(D + free, 0)
+
+
+def _play(p: Values, D: Any, past: Any) -> Any:
+    free = p["free_travel_mm"]
+    return min_value(max_value(past, D - free), D + free)
+
+
+def _half_play(p: Values, D: Any, past: Any) -> Any:
+    """Engaged from behind at the start: free travel on the way out, then again at each turn."""
+    return min_value(max_value(past, D - p["free_travel_mm"]), conditional(gt(D, 0), D, as_ufl(0)))
+
+
+def _locking(power: int) -> FrameVariant:
+    stiffness = Parameter(
+        "k_lock_N", lower=0.0, amplitude=True, meaning=f"moment per angle^{power} beyond locking"
+    )
+    return FrameVariant(
+        f"power {power}",
+        (stiffness, LOCKING_ANGLE),
+        laws=lambda p: (Locking(p["locking_angle_rad"], p["k_lock_N"], power),),
+    )
+
+
+def _branch(number: str, starts: tuple[float, ...]) -> tuple[Parameter, Parameter]:
+    return (
+        Parameter(
+            f"k_maxwell{number}_N", lower=0.0, amplitude=True, meaning="stiffness of the branch"
+        ),
+        Parameter(
+            f"relaxation_time{number}_s",
+            starts,
+            1e-3,
+            10.0,
+            meaning="its relaxation time",
+            share_of="duration",
+        ),
+    )
+
+
+def _even(power: int) -> FrameVariant:
+    stiffness = Parameter(
+        f"k_even{power}_N", amplitude=True, meaning=f"even elastic moment per angle^{power}"
+    )
+    return FrameVariant(
+        f"power {power}",
+        (stiffness,),
+        laws=lambda p: (EvenSpring(p[stiffness.name], power),),
+    )
+
+
+PICTURE_FRAME_EFFECTS = (
+    Effect(
+        "crossover_friction",
+        "picture_frame",
+        "rate-independent moment against the direction of shearing",
+        (
+            FrameVariant(
+                "sliding only",
+                (LIMIT, ROUNDING),
+                laws=lambda p: (SlidingFriction(p["m_c_N"], p["rounding_rad_s"]),),
+            ),
+            FrameVariant(
+                "Coulomb with stick",
+                (LIMIT, SLIP),
+                laws=lambda p: (CoulombFriction(p["m_c_N"], p["m_c_N"] / p["slip_angle_rad"]),),
+            ),
+            FrameVariant(
+                "Dahl",
+                (LIMIT, SLIP),
+                laws=lambda p: (DahlFriction(p["m_c_N"], p["m_c_N"] / p["slip_angle_rad"]),),
+            ),
+        ),
+    ),
+    Effect(
+        "crossover_relaxation",
+        "picture_frame",
+        "Maxwell branch beside the spring: the force decays in a hold",
+        (
+            FrameVariant(
+                "one branch",
+                _branch("", (0.01, 0.03, 0.1, 0.3, 1.0)),
+                laws=lambda p: (Maxwell(p["k_maxwell_N"], p["relaxation_time_s"]),),
+            ),
+            FrameVariant(
+                "two branches",
+                (*_branch("", (0.1, 0.4)), *_branch("2", (0.01, 0.04))),
+                laws=lambda p: (
+                    Maxwell(p["k_maxwell_N"], p["relaxation_time_s"]),
+                    Maxwell(p["k_maxwell2_N"], p["relaxation_time2_s"]),
+                ),
+            ),
+        ),
+    ),
+    Effect(
+        "rate_hardening",
+        "picture_frame",
+        "the dashpot is not linear in rate",
+        (
+            FrameVariant(
+                "power law",
+                (
+                    Parameter("c_n_N_s_n", amplitude=True, meaning="moment per rate^n"),
+                    Parameter("n", (0.3, 0.6, 1.5, 2.0), 0.1, 4.0, meaning="power of the rate"),
+                ),
+                laws=lambda p: (PowerDashpot(p["c_n_N_s_n"], p["n"], floor=1e-7),),
+            ),
+        ),
+    ),
+    Effect(
+        "shear_locking",
+        "picture_frame",
+        "steep extra stiffness past a locking angle",
+        (
+            _locking(1),
+            _locking(2),
+            _locking(3),
+            FrameVariant(
+                "exponential",
+                (
+                    Parameter("m_lock_N", lower=0.0, amplitude=True, meaning="moment of locking"),
+                    LOCKING_ANGLE,
+                    Parameter(
+                        "locking_scale_rad",
+                        (0.05, 0.15),
+                        0.02,
+                        1.0,
+                        meaning="angle in which it grows by e",
+                    ),
+                ),
+                laws=lambda p: (
+                    ExponentialLocking(
+                        p["locking_angle_rad"], p["m_lock_N"], p["locking_scale_rad"]
+                    ),
+                ),
+            ),
+        ),
+    ),
+    Effect(
+        "tension_coupling",
+        "picture_frame",
+        "misaligned clamping stretches the tows: an even elastic force",
+        (_even(2), _even(1), _even(4)),
+    ),
+    Effect(
+        "crosshead_backlash",
+        "picture_frame",
+        "free travel before the frame engages",
+        (
+            FrameVariant("free on the way out", (TRAVEL,), travel=_slack),
+            FrameVariant("free on both sides", (TRAVEL,), travel=_dead_zone),
+            FrameVariant("play", (TRAVEL,), travel=_play, remembers_travel=True),
+            FrameVariant(
+                "play, engaged at rest", (TRAVEL,), travel=_half_play, remembers_travel=True
+            ),
+        ),
+    ),
+    Effect(
+        "load_drift",
+        "picture_frame",
+        "the reading is offset, or drifts in time",
+        (
+            FrameVariant("offset", (OFFSET,), reading=lambda p, t: p["offset_N"]),
+            FrameVariant("drift", (DRIFT,), reading=lambda p, t: p["drift_N_s"] * t),
+            FrameVariant(
+                "offset and drift",
+                (OFFSET, DRIFT),
+                reading=lambda p, t: p["offset_N"] + p["drift_N_s"] * t,
+            ),
+        ),
+    ),
+)

@@ -1,0 +1,155 @@
+"""What the crosshead did between the readings: its rate on either side, turns and holds.
+
+A dashpot and friction depend on the rate, which nobody records. The record is cut where the
+motion turns, starts or stops, and each piece is differentiated by itself, so that a corner
+between two readings does not smear the rates on both sides of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Programme", "programme"]
+
+Array = npt.NDArray[np.float64]
+
+#: A change of speed is a corner if it is this much of the largest speed ...
+LEAST_JUMP = 0.05
+#: ... and this many times the change over the readings around it.
+JUMP_RATIO = 4.0
+#: Points that a rate is taken from: enough to average the rounding of the record away.
+AROUND = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Programme:
+    """A prescribed motion, at its readings and at corners between them.
+
+    Attributes:
+        time: [s], (n,), increasing.
+        displacement: [mm], (n,).
+        rate: its rate [mm/s] on the piece that a point belongs to, (n,).
+        reading: index of the reading at each point; -1 for a corner between readings.
+        certain: whether the rate at each reading is known: not at a corner, (n_readings,).
+    """
+
+    time: Array
+    displacement: Array
+    rate: Array
+    reading: npt.NDArray[np.int64]
+    certain: npt.NDArray[np.bool_]
+
+
+def programme(time: Array, displacement: Array) -> Programme:
+    """Find the corners of a record and the rates between them.
+
+    Args:
+        time: of the readings [s], increasing, (n,).
+        displacement: of the crosshead [mm], (n,).
+    """
+    corners = _corners(time, displacement)
+    edges = [-np.inf, *corners, np.inf]
+    resolution = _resolution(displacement)
+    rate = np.zeros_like(time)
+    near = 1e-6 * float(np.ptp(time))
+    certain = np.ones(len(time), dtype=bool)
+    added: list[tuple[float, float, float]] = []
+    for low, high in pairwise(edges):
+        inside = np.flatnonzero((time >= low - near) & (time <= high + near))
+        if len(inside) == 0:
+            continue
+        # A reading at a corner belongs to the piece before it.
+        rates = _rates(time[inside], displacement[inside], resolution)
+        own = (time[inside] > low + near) | ~np.isfinite(low)
+        rate[inside[own]] = rates[own]
+    for corner in corners:
+        at = np.abs(time - corner) <= near
+        if at.any():
+            certain[at] = False
+        else:
+            k = int(np.searchsorted(time, corner))
+            # Reached along the piece before it.
+            value = displacement[k - 1] + rate[k - 1] * (corner - time[k - 1])
+            added.append((corner, float(value), float(rate[k - 1])))
+    points = [
+        (t, d, v, i) for i, (t, d, v) in enumerate(zip(time, displacement, rate, strict=True))
+    ]
+    points += [(t, d, v, -1) for t, d, v in added]
+    first, speed = float(displacement[0]), float(rate[0])
+    if first * speed > 0.0 and abs(first) > resolution:
+        # The frame starts from the square, also where the record does not.
+        points.append((float(time[0]) - first / speed, 0.0, speed, -1))
+    elif abs(first) <= max(resolution, 1e-9):
+        certain[0] = False
+    points.sort(key=lambda point: point[0])
+    columns = np.array(points)
+    return Programme(
+        columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3].astype(np.int64), certain
+    )
+
+
+def _resolution(values: Array) -> float:
+    """Half of the last decimal that is written [the unit of the values]."""
+    for decimals in range(8):
+        if np.allclose(values, np.round(values, decimals), rtol=0.0, atol=1e-10):
+            return 0.5 * 10.0**-decimals
+    return 0.0
+
+
+def _rates(time: Array, displacement: Array, resolution: float) -> Array:
+    """Rate at each point of one piece, from the cubic through the points around it."""
+    count = len(time)
+    if np.ptp(displacement) <= 2.0 * resolution:
+        return np.zeros(count)
+    if count < 5:
+        return np.full(count, np.polyfit(time - time[0], displacement, 1)[0])
+    width = min(AROUND, count)
+    rates = np.empty(count)
+    for i in range(count):
+        first = min(max(i - width // 2, 0), count - width)
+        own = slice(first, first + width)
+        scale = time[own][-1] - time[own][0]
+        cubic = np.polyfit((time[own] - time[i]) / scale, displacement[own], min(3, width - 2))
+        rates[i] = cubic[-2] / scale
+    return rates
+
+
+def _corners(time: Array, displacement: Array) -> list[float]:
+    """Times at which the speed jumps."""
+    count = len(time)
+    if count < 6:
+        return []
+    speed = np.diff(displacement) / np.diff(time)
+    resolution = _resolution(displacement)
+    doubt = 4.0 * resolution / np.diff(time)
+    top = float(np.abs(speed).max())
+    found: list[float] = []
+    for j in range(1, len(speed) - 1):
+        # Across interval j, from the interval before to the one after it.
+        jump = abs(speed[j + 1] - speed[j - 1])
+        before = abs(speed[j - 1] - speed[j - 3]) if j >= 3 else 0.0
+        after = abs(speed[j + 3] - speed[j + 1]) if j + 3 < len(speed) else 0.0
+        if j < 3:
+            before = after
+        if j + 3 >= len(speed):
+            after = before
+        if jump < max(LEAST_JUMP * top, doubt[j - 1] + doubt[j + 1]):
+            continue
+        if jump < JUMP_RATIO * max(before, after):
+            continue
+        left, right = speed[j - 1], speed[j + 1]
+        # Where the lines through the intervals before and after meet.
+        rise = displacement[j + 1] - displacement[j] - right * (time[j + 1] - time[j])
+        corner = time[j] + rise / (left - right)
+        slack = 0.02 * (time[j + 1] - time[j])
+        if time[j] - slack <= corner <= time[j + 1] + slack:
+            nearest = time[np.argmin(np.abs(time - corner))]
+            if abs(nearest - corner) < slack:
+                corner = nearest
+            if not found or corner - found[-1] > slack:
+                found.append(float(corner))
+    return found

@@ -1,0 +1,388 @@
+"""Trace a residual to an effect: score every candidate, add the best, refit, and know when to stop.
+
+    score      the residual's projection on the candidate's signature, the model's sensitivity to
+               its amplitude at zero, after what the baseline can absorb: one extra solution
+    fit        the whole model again, with the candidate in it
+    criterion  χ² + k ln n of the fitted readings (Schwarz); held-out readings never choose
+
+What is accepted must leave noise in the fitted readings and bring the held-out error near it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import chi2
+
+from ..errors import SolveError
+from .effects import Effect, Variant
+from .experiment import Experiment
+from .fitting import Fit, fit, fit_from_grid, orthogonal_to, signatures
+from .noise import Whiteness, estimated_noise, spikes, whiteness
+
+__all__ = ["Candidate", "Diagnosis", "diagnose_test"]
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+Verdict = Literal["no_effect", "effect_found", "unexplained"]
+
+#: Probability of a score by chance, over all candidates together, below which it is followed.
+ALARM = 0.01
+#: Held-out error over noise up to which a model explains the data.
+NEAR = 1.15
+#: χ² + k ln n by which a second effect must win, and by which a rival may lose.
+DECISIVE = 10.0
+#: Effects at most: any three of them would fit almost anything.
+MOST = 2
+#: Effects whose pairs with every other are tried where no single one explains the data.
+FIRST = 3
+
+
+@dataclass(slots=True)
+class Candidate:
+    """An effect that was tried by itself.
+
+    Attributes:
+        effect: which.
+        score: its largest score over its forms, in units of noise².
+        p_value: of that score, over all candidates that were tried.
+        fit: the model with its best form; None where it has no solution.
+        holdout: held-out error of that model.
+    """
+
+    effect: Effect
+    score: float
+    p_value: float
+    fit: Fit | None = None
+    holdout: float = float("nan")
+
+
+@dataclass(slots=True)
+class Diagnosis:
+    """What was found.
+
+    Attributes:
+        experiment: the test.
+        verdict: what is said in the end.
+        noise, noise_source: sigma of a reading and where it comes from.
+        baseline: the fitted baseline.
+        final: the fitted model that is reported; the baseline where nothing was added.
+        best: the model that came nearest, where that is not ``final``.
+        effects: of ``final``, strongest first.
+        rivals: by effect, others that this data cannot tell from it.
+        candidates: every effect tried.
+        holdout_before, holdout_after: held-out errors.
+        holdout_source: how they were come by.
+        white_before, white_after: tests of the residuals.
+        outliers: readings that were left out, (n,).
+    """
+
+    experiment: Experiment
+    verdict: Verdict
+    noise: float
+    noise_source: str
+    baseline: Fit
+    final: Fit
+    best: Fit | None
+    effects: tuple[Effect, ...]
+    rivals: dict[str, list[str]]
+    candidates: list[Candidate]
+    holdout_before: float
+    holdout_after: float
+    holdout_source: str
+    white_before: Whiteness
+    white_after: Whiteness
+    outliers: Flags
+    notes: list[str] = field(default_factory=list)
+
+
+def diagnose_test(
+    experiment: Experiment,
+    names: Sequence[str] | None = None,
+    progress: Callable[[float, str], None] = lambda done, what: None,
+) -> Diagnosis:
+    """Fit the baseline of a test and trace what is left.
+
+    Args:
+        experiment: the test.
+        names: effects to try; by default all that it knows.
+        progress: told the share that is done and what is being done.
+
+    Raises:
+        SolveError: the baseline could not be fitted.
+    """
+    return _Search(experiment, names, progress).run()
+
+
+class _Search:
+    """One search, with what it carries from step to step."""
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        names: Sequence[str] | None,
+        progress: Callable[[float, str], None],
+    ) -> None:
+        self.experiment, self.progress = experiment, progress
+        self.readings = experiment.readings
+        self.tried = [e for e in experiment.effects if names is None or e.name in names]
+        start = {p.name: p.starts[0] for p in experiment.baseline}
+        rows = self.readings.fit
+        first = fit(experiment, (), start, rows)
+        self.outliers = spikes(first.residual, self.readings, self.readings.usable)
+        if self.outliers.any():
+            first = fit(experiment, (), first.values, rows & ~self.outliers)
+        self.rows = first.used
+        if self.rows.sum() <= len(first.values):
+            raise SolveError(
+                f"the baseline has {len(first.values)} parameters "
+                f"and there are {int(self.rows.sum())} readings to fit"
+            )
+        self.baseline = first
+        self.given = experiment.noise is not None
+        self.noise = experiment.noise or estimated_noise(first.residual, self.readings, self.rows)
+
+    def run(self) -> Diagnosis:
+        """See diagnose_test."""
+        baseline = self.baseline
+        candidates = self._scores()
+        for k, candidate in enumerate(candidates):
+            self.progress(0.1 + 0.5 * k / len(candidates), f"fit {candidate.effect.name}")
+            candidate.fit = self._best_variant(baseline, candidate.effect)
+        singles = [c for c in candidates if c.fit is not None]
+        singles.sort(key=lambda c: self._criterion(c.fit))
+        if not self.given and singles:
+            self.noise = self._noise_of(singles[0].fit or baseline)
+        before = self._whiteness(baseline)
+        chosen: Fit = baseline
+        effects: tuple[Effect, ...] = ()
+        explained = self._explains(baseline)
+        alarm = any(c.p_value < ALARM for c in candidates)
+        best: Fit | None = None
+        if alarm or not explained:
+            chosen, effects, explained = self._choose(singles)
+            best = chosen
+        for candidate in candidates:
+            if candidate.fit is not None:
+                candidate.holdout = self._holdout(candidate.fit)
+        verdict: Verdict = "no_effect"
+        if best is not None:
+            verdict = "effect_found" if explained and effects else "unexplained"
+            if not effects and explained:
+                verdict = "no_effect"
+        if verdict != "effect_found":
+            chosen, effects = baseline, ()
+        self.progress(0.95, "rivals")
+        return Diagnosis(
+            experiment=self.experiment,
+            verdict=verdict,
+            noise=self.noise,
+            noise_source="given"
+            if self.given
+            else "estimated from how neighbouring readings differ",
+            baseline=baseline,
+            final=chosen,
+            best=best if best is not chosen else None,
+            effects=effects,
+            rivals=self._rivals(chosen, effects, singles),
+            candidates=candidates,
+            holdout_before=self._holdout(baseline),
+            holdout_after=self._holdout(chosen),
+            holdout_source=self._source(),
+            white_before=before,
+            white_after=self._whiteness(chosen),
+            outliers=self.outliers,
+        )
+
+    # Scores -------------------------------------------------------------------------------
+
+    def _scores(self) -> list[Candidate]:
+        """Score tests at zero amplitude, corrected for the number of signatures that are tried."""
+        rows, base = self.rows, self.baseline
+        weight = base.weight[rows]
+        r = (base.residual * base.weight)[rows]
+        found: list[tuple[Effect, float, float]] = []
+        count = 0
+        for k, effect in enumerate(self.tried):
+            self.progress(0.1 * k / len(self.tried), f"score {effect.name}")
+            best, smallest = 0.0, 1.0
+            for variant in effect.variants:
+                for _, columns in signatures(self.experiment, base, variant):
+                    count += 1
+                    J = np.column_stack([columns[n][rows] * weight for n in base.values])
+                    own = np.column_stack(
+                        [columns[p.name][rows] * weight for p in variant.amplitudes]
+                    )
+                    score, p_value = self._score(r, J, own, variant)
+                    if p_value < smallest or best == 0.0:
+                        best, smallest = max(best, score), min(smallest, p_value)
+            found.append((effect, best, smallest))
+        return [Candidate(e, score, min(1.0, p * count)) for e, score, p in found]
+
+    def _score(self, r: Array, J: Array, own: Array, variant: Variant) -> tuple[float, float]:
+        left = orthogonal_to(J, own)
+        # What the baseline imitates to round-off has no signature of its own.
+        seen = np.linalg.norm(left, axis=0) > 1e-7 * np.linalg.norm(own, axis=0)
+        left = left[:, seen]
+        if left.shape[1] == 0:
+            return 0.0, 1.0
+        left /= np.linalg.norm(left, axis=0)
+        if left.shape[1] == 1:
+            z = float(left[:, 0] @ r) / self.noise
+            amplitude = next(p for p, kept in zip(variant.amplitudes, seen, strict=True) if kept)
+            if amplitude.one_sided and z < 0.0:
+                return 0.0, 1.0
+            return z * z, float(chi2.sf(z * z, 1))
+        part = np.linalg.lstsq(left, r, rcond=1e-8)[0]
+        score = float(np.sum((left @ part) ** 2)) / self.noise**2
+        return score, float(chi2.sf(score, left.shape[1]))
+
+    # Fits ---------------------------------------------------------------------------------
+
+    def _criterion(self, model: Fit | None, noise: float | None = None) -> float:
+        """χ² + k ln n; smaller is better."""
+        if model is None:
+            return float("inf")
+        noise = noise or self.noise
+        return model.sum_of_squares / noise**2 + len(model.values) * float(
+            np.log(max(int(model.used.sum()), 2))
+        )
+
+    def _best_variant(self, base: Fit, effect: Effect, *, starts: int = 2) -> Fit | None:
+        fits = fit_from_grid(self.experiment, base, effect.variants, starts=starts)
+        return min(fits, key=self._criterion, default=None)
+
+    def _choose(self, singles: list[Candidate]) -> tuple[Fit, tuple[Effect, ...], bool]:
+        """The best model of one effect, or of two where one does not explain the data."""
+        if not singles:
+            return self.baseline, (), False
+        first = singles[0]
+        assert first.fit is not None
+        single = (first.fit, (first.effect,))
+        # Only where the residual still shows structure is a second effect looked for.
+        explained = self._explains(first.fit)
+        if explained and not self._whiteness(first.fit).structured:
+            return (*single, True)
+        pairs = self._pairs(singles)
+        if not pairs:
+            return (*single, explained)
+        best, effects = min(pairs, key=lambda pair: self._criterion(pair[0]))
+        gain = self._criterion(first.fit) - self._criterion(best)
+        if not explained:
+            return (best, effects, True) if self._explains(best) else (*single, False)
+        better = self._holdout(best) < 0.97 * self._holdout(first.fit)
+        if gain > DECISIVE and better and self._explains(best):
+            return best, effects, True
+        return (*single, True)
+
+    def _pairs(self, singles: list[Candidate]) -> list[tuple[Fit, tuple[Effect, ...]]]:
+        """The first few effects with each of the others, the stronger first."""
+        found: list[tuple[Fit, tuple[Effect, ...]]] = []
+        pairs = [(a, b) for a, b in combinations(singles, MOST) if singles.index(a) < FIRST]
+        for k, (a, b) in enumerate(pairs):
+            self.progress(0.6 + 0.3 * k / len(pairs), f"fit {a.effect.name}, {b.effect.name}")
+            assert a.fit is not None
+            both = self._best_variant(a.fit, b.effect, starts=1)
+            if both is not None:
+                found.append((both, (a.effect, b.effect)))
+        return found
+
+    # Judgement ----------------------------------------------------------------------------
+
+    def _noise_of(self, model: Fit) -> float:
+        return estimated_noise(model.residual, self.readings, self.rows)
+
+    def _whiteness(self, model: Fit) -> Whiteness:
+        return whiteness(
+            model.residual, self.noise, self.given, len(model.values), self.readings, self.rows
+        )
+
+    def _explains(self, model: Fit) -> bool:
+        """Whether a model leaves noise: in size on what was fitted and on what was held out."""
+        count = int(self.rows.sum())
+        scatter = np.sqrt(model.sum_of_squares / model.freedom) / self.noise
+        if scatter > max(1.1, _upper(model.freedom)):
+            return False
+        white = self._whiteness(model)
+        if min(white.blocks, white.lags, white.period) < 1e-8:
+            return False
+        out = self._held_rows()
+        if out.any():
+            return bool(self._holdout(model) / self.noise <= max(NEAR, _upper(int(out.sum()))))
+        return count > len(model.values)
+
+    def _held_rows(self) -> Flags:
+        return np.asarray(self.readings.holdout & self.readings.usable & ~self.outliers)
+
+    def _source(self) -> str:
+        if self._held_rows().any():
+            return "holdout runs"
+        return (
+            "leave one run out"
+            if len(self._parts()) > 1 and self._by_run()
+            else ("leave one of five blocks out")
+        )
+
+    def _by_run(self) -> bool:
+        return len(np.unique(self.readings.run[self.rows])) > 1
+
+    def _parts(self) -> list[Flags]:
+        """Parts of the fitted readings to be left out in turn."""
+        runs = np.unique(self.readings.run[self.rows])
+        if len(runs) > 1:
+            return [self.rows & (self.readings.run == run) for run in runs]
+        own = np.flatnonzero(self.rows)
+        parts = []
+        for block in np.array_split(own, 5):
+            part = np.zeros_like(self.rows)
+            part[block] = True
+            parts.append(part)
+        return parts
+
+    def _holdout(self, model: Fit) -> float:
+        """Held-out error: of the holdout runs, or of each part predicted from the others."""
+        out = self._held_rows()
+        if out.any():
+            return model.rms(out)
+        total, count = 0.0, 0
+        for part in self._parts():
+            rest = self.rows & ~part
+            if rest.sum() <= len(model.values) or not part.any():
+                continue
+            try:
+                again = fit(self.experiment, model.variants, model.values, rest, evaluations=25)
+            except SolveError:
+                continue
+            total += float(np.sum((again.residual * again.weight)[part] ** 2))
+            count += int(part.sum())
+        return float(np.sqrt(total / count)) if count else float("nan")
+
+    def _rivals(
+        self, chosen: Fit, effects: tuple[Effect, ...], singles: list[Candidate]
+    ) -> dict[str, list[str]]:
+        """For each effect, the others that could take its place in the model."""
+        found: dict[str, list[str]] = {}
+        limit = self._criterion(chosen) + DECISIVE
+        for own in effects:
+            others = [c for c in singles if c.effect not in effects]
+            found[own.name] = []
+            for other in others:
+                if len(effects) == 1:
+                    instead = other.fit
+                else:
+                    kept = next(e for e in effects if e is not own)
+                    base = next(c.fit for c in singles if c.effect is kept)
+                    instead = self._best_variant(base, other.effect) if base else None
+                if instead is not None and self._criterion(instead) < limit:
+                    found[own.name].append(other.effect.name)
+        return found
+
+
+def _upper(freedom: int) -> float:
+    """Scatter over noise that is exceeded by chance once in a thousand."""
+    return float(np.sqrt(chi2.isf(1e-3, max(freedom, 1)) / max(freedom, 1)))
