@@ -58,6 +58,10 @@ class CrossoverKeys(Keys):
     alignment_N_mm: Positive = Field(
         1000.0, description="moment per crossing that keeps the sheet normals of the tows aligned"
     )
+    slip_limit_N: Positive | None = Field(
+        None,
+        description="in-plane force at which crossing tows slip on each other; null: never",
+    )
     laws: list[ShearLawKeys] = Field(
         default_factory=list,
         description="further in-plane moments: tabulated_spring, power_dashpot, tabulated_dashpot, "

@@ -89,6 +89,7 @@ def crossover_law(keys: CrossoverKeys, warp_spacing: float, weft_spacing: float)
         dashpot=keys.dashpot_N_s_mm * area,
         alignment=keys.alignment_N_mm,
         laws=tuple(law.build(area) for law in keys.laws),
+        slip_limit=keys.slip_limit_N,
     )
 
 

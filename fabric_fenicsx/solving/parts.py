@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from .. import _dolfinx
 from .._dolfinx import Function
-from ..mechanics import contact, crossover
+from ..mechanics import contact, crossover, slip
 from ..mechanics.shear_laws import Crossing, LinearDashpot, PolynomialSpring, ShearLaw
 from ..mechanics.terms import Term, energy_term, work_term
 from ..mechanics.tools import SampledTool, Tool
@@ -34,6 +34,8 @@ class CrossoverLaw:
         dashpot: β of M = β γ̇ [N mm s].
         alignment: restoring moment of the sheet normals per sine of their tilt [N mm].
         laws: further in-plane moments, see mechanics.shear_laws.
+        slip_limit: force at which the springs slip in the plane of the sheet [N], see
+            mechanics.slip; None: never.
     """
 
     translation: float
@@ -42,6 +44,7 @@ class CrossoverLaw:
     dashpot: float
     alignment: float
     laws: tuple[ShearLaw, ...] = ()
+    slip_limit: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +92,9 @@ class Crossings:
         self.per_time = number(1.0)
         gamma = crossover.shear_angle(fields, fields.w)
         gamma_n = Function(self._space)
+        remembered: list[tuple[str, Any, Any]] = [("shear angle", gamma_n, gamma)]
         self.terms = [
-            energy_term(
-                "translation springs",
-                fields,
-                crossover.opening_energy(fields, number(law.translation)),
-            ),
+            self._springs(law, number, remembered),
             energy_term(
                 "normal alignment",
                 fields,
@@ -102,7 +102,6 @@ class Crossings:
             ),
         ]
         moments = []
-        remembered: list[tuple[str, Any, Any]] = [("shear angle", gamma_n, gamma)]
         for piece in turning:
             memory: dict[str, Function] = {}
 
@@ -126,6 +125,20 @@ class Crossings:
         self._remember(histories, remembered)
         self._angle = self._compiled(gamma)
         self._moment = self._compiled(fields.interlacing * sum(moments))
+
+    def _springs(
+        self, law: CrossoverLaw, number: Any, remembered: list[tuple[str, Any, Any]]
+    ) -> Term:
+        """The translational springs; what they remember goes on the list."""
+        name, fields, k = "translation springs", self.disc.connectors, number(law.translation)
+        assert fields is not None
+        if law.slip_limit is None:
+            return energy_term(name, fields, crossover.opening_energy(fields, k))
+        slip_n = (Function(self._space), Function(self._space))
+        springs = slip.SlippingSprings(fields, k, number(law.slip_limit), slip_n)
+        for direction, past, new in zip(("along", "across"), slip_n, springs.slip(), strict=True):
+            remembered.append((f"slip {direction} the warp", past, new))
+        return work_term(name, fields, springs.work(), energy=springs.energy(), loss=springs.loss())
 
     def _without_crossings(self, turning: Sequence[ShearLaw], histories: Histories) -> None:
         """The same collective calls on a rank that has no crossing of its own."""
