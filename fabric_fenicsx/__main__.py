@@ -18,7 +18,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
     from .cli import app
-    from .errors import InputError
+    from .cli.collective import say
+    from .errors import InputError, SolveError
     from .parallel import launched, rank
 
     if rank() != 0:
@@ -27,17 +28,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
         code = app(list(arguments) if arguments is not None else None, standalone_mode=False)
     except KeyboardInterrupt:
         code = 130
+    except (InputError, SolveError) as error:
+        say(" ".join(str(error).split()))
+        code = error.exit_code
+    except OSError as error:
+        # What a command without results of its own could not read or write.
+        place = f"{error.filename}: " if error.filename else ""
+        say(f"{place}{error.strerror or ' '.join(str(error).split())}")
+        code = InputError.exit_code
     except Exception as error:
         # Typer's own errors have no common public class; this is what they have in common.
         if not hasattr(error, "format_message"):
             raise
         message = " ".join(error.format_message().split())
-        if rank() == 0 and message:
-            print(
-                f"{message} (fabric-fenicsx --help lists what is allowed)",
-                file=sys.stderr,
-                flush=True,
-            )
+        if message:
+            say(f"{message} (fabric-fenicsx --help lists what is allowed)")
         if launched():
             # mpirun ends all ranks with the first that leaves: leave together, after the line.
             from mpi4py import MPI

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from .rigs.keys import unit
 
-__all__ = ["following", "summarise"]
+__all__ = ["counting", "following", "summarise"]
 
 COMPILING = "compiling forms, about a minute on a first run"
 
@@ -88,6 +88,23 @@ def following(quiet: bool) -> Iterator[Any]:
         watcher.end()
         if bar is not None:
             bar.stop()
+
+
+@contextmanager
+def counting(what: str, total: int) -> Iterator[Any]:
+    """A function that is told how many of a number of things are done; shown on a terminal."""
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn(what),
+        BarColumn(),
+        TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    ) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda done: bar.update(task, completed=done)
 
 
 def summarise(result: dict[str, Any], folder: Any) -> None:

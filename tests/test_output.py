@@ -13,8 +13,9 @@ import pyvista as pv
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import WARP, WEFT, Net, single_tow
 from fabric_fenicsx.output import paraview
+from fabric_fenicsx.output.lines import COLOURS
 from fabric_fenicsx.output.paraview import TimeSeries
-from fabric_fenicsx.output.pictures import COLOURS, VIEWS, draw_net
+from fabric_fenicsx.output.pictures import VIEWS, draw_net
 from fabric_fenicsx.output.snapshot import Snapshot, at_rest
 from fabric_fenicsx.output.surfaces import RevolvedSurface
 

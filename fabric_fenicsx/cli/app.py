@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from inspect import cleandoc
 from typing import Annotated
 
 import typer
 
 from .. import __version__
+from .animate import animate
+from .check import check
+from .doctor import doctor
+from .export import export
+from .fibres import fibres
 from .keys import keys
+from .mesh import mesh
+from .new import new
 from .run import run
+from .view import view
 
 __all__ = ["app"]
 
@@ -18,7 +28,6 @@ app = typer.Typer(
     epilog="Example: fabric-fenicsx run demos/drape.yaml --out results/drape",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
 )
 
 
@@ -37,10 +46,26 @@ def common(
     """Draping of woven fabric as networks of geometrically exact beams, on FEniCSx."""
 
 
-app.command(
-    epilog="Examples: fabric-fenicsx run demos/drape.yaml  |  "
-    "mpirun -n 2 fabric-fenicsx run demos/drape.yaml --out results/fine --set sheet.subdivisions=4"
-)(run)
-app.command(
-    epilog="Examples: fabric-fenicsx keys drape  |  fabric-fenicsx keys --markdown > keys.md"
-)(keys)
+# In the order of the help. Typer joins the lines of an epilog: one example stands behind another.
+EXAMPLES: dict[Callable[..., None], list[str]] = {
+    run: ["run demos/drape.yaml", "run demos/drape.yaml --out results/fine --set tow.C1_MPa=3e4"],
+    new: ["new drape", "new picture_frame mine.yaml"],
+    check: ["check demos/drape.yaml", "check demos/drape.yaml --set sheet.subdivisions=4"],
+    keys: ["keys drape", "keys --markdown > keys.md"],
+    mesh: ["mesh demos/drape.yaml --out sheet.msh"],
+    view: ["view results/drape", "view results/drape --html", "view results/drape --time 30"],
+    animate: ["animate results/drape", "animate results/drape --out drape.mp4"],
+    fibres: ["fibres results/drape", "fibres results/drape --out fibres.vtu"],
+    export: ["export results/drape net.vtk"],
+    doctor: ["doctor"],
+}
+
+for command, lines in EXAMPLES.items():
+    label = "Example: " if len(lines) == 1 else "Examples: "
+    app.command(
+        # Typer keeps the line ends of a docstring; a terminal has its own.
+        help="\n\n".join(
+            " ".join(p.split()) for p in cleandoc(command.__doc__ or "").split("\n\n")
+        ),
+        epilog=label + "  |  ".join(f"fabric-fenicsx {line}" for line in lines),
+    )(command)

@@ -112,7 +112,32 @@ def _doubled(net: Net, snapshot: Snapshot, axis: int) -> tuple[Net, Snapshot]:
         shear_angle=np.append(snapshot.shear_angle, -snapshot.shear_angle[crossed]),
         crossing_moment=np.append(snapshot.crossing_moment, -snapshot.crossing_moment[crossed]),
     )
-    return whole, state
+    return _renumbered(whole, state)
+
+
+def _renumbered(net: Net, snapshot: Snapshot) -> tuple[Net, Snapshot]:
+    """The net with nodes that rise along each tow, as every net made from a mesh has them."""
+    order: list[Integers] = []
+    for tow in range(len(net.tow_family)):
+        own = net.cells[net.cell_tow == tow]
+        order += [own[:, 0], own[-1:, 1]]
+    nodes = np.concatenate(order)
+    number = np.empty(len(nodes), dtype=np.int64)
+    number[nodes] = np.arange(len(nodes))
+    renumbered = replace(
+        net,
+        points=net.points[nodes],
+        cells=number[net.cells],
+        crossings=number[net.crossings],
+        ends=number[net.ends],
+    )
+    state = replace(
+        snapshot,
+        displacement=snapshot.displacement[nodes],
+        directors=snapshot.directors[nodes],
+        contact_pressure=snapshot.contact_pressure[nodes],
+    )
+    return renumbered, state
 
 
 def _rank(copied: Integers, backwards: npt.NDArray[np.bool_]) -> Integers:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,49 +13,26 @@ from matplotlib import colormaps
 from matplotlib.colors import ListedColormap
 from scipy.interpolate import CubicHermiteSpline
 from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonCore import vtkLogger
 
 from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.output.canvas import canvas, headline
+from fabric_fenicsx.output.lines import (
+    COLOURS,
+    Line,
+    arc_length,
+    round_step,
+    scale_limits,
+    tow_lines,
+    tow_spacing,
+)
 from fabric_fenicsx.output.mirror import whole_sheet
 from fabric_fenicsx.output.snapshot import Snapshot
 from fabric_fenicsx.output.surfaces import RevolvedSurface, TriangleSurface, triangulated
 
-__all__ = ["COLOURS", "VIEWS", "draw_net"]
+__all__ = ["VIEWS", "draw_net"]
 
 Array = npt.NDArray[np.float64]
 
-
-@dataclass(frozen=True, slots=True)
-class _Colour:
-    """One quantity: its title, where it lives, its values, and whether its sign means anything."""
-
-    title: str
-    place: str
-    values: Callable[[Snapshot], Array]
-    signed: bool = False
-
-
-# The sign of the shear angle tells which diagonal is the short one; pictures show its size.
-COLOURS = {
-    "shear_angle": _Colour(
-        "shear angle [°]", "crossings", lambda s: np.degrees(np.abs(s.shear_angle))
-    ),
-    "crossing_moment": _Colour(
-        "crossing moment [N mm]", "crossings", lambda s: np.abs(s.crossing_moment)
-    ),
-    "axial_force": _Colour("axial force [N]", "cells", lambda s: s.section_forces[:, 0], True),
-    "torsion": _Colour("torsion [N mm]", "cells", lambda s: s.section_moments[:, 0], True),
-    "bending_out_of_plane": _Colour(
-        "bending out of plane [N mm]", "cells", lambda s: s.section_moments[:, 1], True
-    ),
-    "bending_in_plane": _Colour(
-        "bending in plane [N mm]", "cells", lambda s: s.section_moments[:, 2], True
-    ),
-    "contact_pressure": _Colour("contact [N/mm]", "nodes", lambda s: s.contact_pressure),
-    "displacement": _Colour(
-        "displacement [mm]", "nodes", lambda s: np.linalg.norm(s.displacement, axis=1)
-    ),
-}
 
 # From the picture to the eye, and what points upwards.
 VIEWS = {
@@ -67,6 +42,10 @@ VIEWS = {
     "side": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
 }
 
+# Towards the eye's right, up and the eye: a key light from the upper left, a weaker fill from the
+# right and one from behind.
+LIGHTS = (((-1.0, 0.9, 1.6), 0.78), ((1.4, 0.2, 0.8), 0.3), ((0.0, 1.0, -1.0), 0.12))
+
 # Perceptually uniform; without its darkest end, in which the shading of a tube would be lost.
 SEQUENTIAL = ListedColormap(colormaps["viridis"](np.linspace(0.06, 1.0, 256)))
 VIEW_ANGLE = 24.0  # of the perspective [deg]; small, so that the far edge keeps its size
@@ -74,16 +53,8 @@ SPLITS = 4  # straight pieces drawn for each cell
 SIDES = 16  # of a tube
 
 
-@dataclass(frozen=True, slots=True)
-class _Line:
-    """One tow: its deformed nodes (n, 3) and values there (n,), NaN where there are none."""
-
-    points: Array
-    values: Array
-
-
 def draw_net(
-    path: str | Path,
+    path: str | Path | None,
     net: Net,
     snapshot: Snapshot,
     *,
@@ -95,6 +66,7 @@ def draw_net(
     mirror: bool = False,
     size: tuple[int, int] = (1600, 1200),
     radius: float | None = None,
+    frame: Array | None = None,
 ) -> None:
     """Draw the deformed net as tubes over translucent tools.
 
@@ -102,7 +74,8 @@ def draw_net(
     stay as they are beyond its last crossing or cell. Shear angles are shown without their sign.
 
     Args:
-        path: the picture, by its ending .png, .jpg or .tif; its folder is made.
+        path: the picture, by its ending .png, .jpg or .tif; its folder is made. None opens a
+            window instead.
         net: the net.
         snapshot: its state.
         surfaces: the tools.
@@ -114,6 +87,8 @@ def draw_net(
         mirror: the net is the quarter x >= 0, y >= 0 of a sheet; show all of it. Tools are whole.
         size: width and height [pixels].
         radius: of the tubes [mm]; by default 0.12 of the spacing of the tows.
+        frame: points that shall fill the picture [mm], shape (k, 3), so that several pictures have
+            one camera; by default what is drawn.
 
     Raises:
         ValueError: an array has not the shape that the net asks for, no such view or colour, or
@@ -127,126 +102,59 @@ def draw_net(
     if mirror:
         net, snapshot = whole_sheet(net, snapshot)
     quantity = COLOURS[colour]
-    lines = list(_tows(net, snapshot, quantity))
+    lines = list(tow_lines(net, snapshot, quantity))
     if limits is None:
-        limits = _limits(quantity, np.concatenate([line.values for line in lines]))
+        limits = scale_limits(quantity, np.concatenate([line.values for line in lines]))
     if not limits[0] < limits[1]:
         raise ValueError(f"picture: limits are {limits}, not a lower and a higher value")
-    step = _step(limits[1] - limits[0])
+    step = round_step(limits[1] - limits[0])
     diverging = quantity.signed and limits[0] < 0.0 < limits[1]
-    tubes = _tubes(lines, radius if radius is not None else 0.12 * _spacing(net))
+    tubes = _tubes(lines, radius if radius is not None else 0.12 * tow_spacing(net))
     tools = [(triangulated(surface), surface) for surface in surfaces]
 
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with _quiet():
-        plotter: Any = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
-        try:
-            plotter.set_background("white")
-            _light(plotter)
-            for mesh, surface in tools:
-                plotter.add_mesh(
-                    mesh,
-                    color=surface.colour,
-                    opacity=surface.opacity,
-                    smooth_shading=True,
-                    split_sharp_edges=True,
-                    feature_angle=40.0,
-                    specular=0.35,
-                    specular_power=25.0,
-                    show_scalar_bar=False,
-                )
-                rims = mesh.extract_feature_edges(
-                    40.0, manifold_edges=False, non_manifold_edges=False
-                )
-                if rims.n_points:
-                    plotter.add_mesh(rims, color="#5f6b78", line_width=size[1] / 600.0)
+    with canvas(path, size, LIGHTS) as plotter:
+        for mesh, surface in tools:
             plotter.add_mesh(
-                tubes,
-                scalars="values",
-                cmap="coolwarm" if diverging else SEQUENTIAL,
-                clim=limits,
-                nan_color="#8a8a8a",
+                mesh,
+                color=surface.colour,
+                opacity=surface.opacity,
                 smooth_shading=True,
-                ambient=0.2,
-                specular=0.18,
-                specular_power=18.0,
+                split_sharp_edges=True,
+                feature_angle=40.0,
+                specular=0.35,
+                specular_power=25.0,
                 show_scalar_bar=False,
             )
-            _annotate(plotter, quantity.title, limits, step, title, size)
-            if tools:
-                plotter.enable_depth_peeling(8)
-            plotter.enable_anti_aliasing("ssaa")
-            _aim(plotter, view, [tubes.points, *(mesh.points for mesh, _ in tools)], size)
-            plotter.screenshot(str(path))
-        finally:
-            plotter.close()
+            rims = mesh.extract_feature_edges(40.0, manifold_edges=False, non_manifold_edges=False)
+            if rims.n_points:
+                plotter.add_mesh(rims, color="#5f6b78", line_width=size[1] / 600.0)
+        plotter.add_mesh(
+            tubes,
+            scalars="values",
+            cmap="coolwarm" if diverging else SEQUENTIAL,
+            clim=limits,
+            nan_color="#8a8a8a",
+            smooth_shading=True,
+            ambient=0.2,
+            specular=0.18,
+            specular_power=18.0,
+            show_scalar_bar=False,
+        )
+        _scale(plotter, quantity.title, limits, step, size)
+        if title is not None:
+            headline(plotter, title, 18.0 * _unit(size))
+        if tools:
+            plotter.enable_depth_peeling(8)
+        clouds = (np.asarray(mesh.points) for mesh in (tubes, *(mesh for mesh, _ in tools)))
+        shown = list(clouds) if frame is None else [frame]
+        _aim(plotter, view, shown, size)
 
 
-def _tows(net: Net, snapshot: Snapshot, quantity: _Colour) -> Iterator[_Line]:
-    """Each tow with the values of a quantity at its nodes."""
-    deformed = net.points + snapshot.displacement
-    values = quantity.values(snapshot)
-    at_nodes = np.full(len(net.points), np.nan)
-    if quantity.place == "nodes":
-        at_nodes[:] = values
-    elif quantity.place == "crossings":
-        at_nodes[net.crossings] = values[:, None]
-    order = np.argsort(net.cell_tow, kind="stable")
-    for cells in np.split(order, np.flatnonzero(np.diff(net.cell_tow[order])) + 1):
-        nodes = np.append(net.cells[cells, 0], net.cells[cells[-1], 1])
-        arc = _arc(net.points[nodes])
-        if quantity.place == "cells":
-            known, at = values[cells], (arc[1:] + arc[:-1]) / 2.0
-        else:
-            here = np.isfinite(at_nodes[nodes])
-            known, at = at_nodes[nodes][here], arc[here]
-        spread = np.interp(arc, at, known) if len(known) else np.full(len(nodes), np.nan)
-        yield _Line(deformed[nodes], spread)
-
-
-def _arc(points: Array) -> Array:
-    """Arc length from the first point to each, shape (n,)."""
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
-
-
-def _spacing(net: Net) -> float:
-    """Distance of neighbouring tows [mm]: the median of that between crossings along a tow."""
-    arcs = []
-    crosses = np.zeros(len(net.points), dtype=bool)
-    crosses[net.crossings] = True
-    order = np.argsort(net.cell_tow, kind="stable")
-    for cells in np.split(order, np.flatnonzero(np.diff(net.cell_tow[order])) + 1):
-        nodes = np.append(net.cells[cells, 0], net.cells[cells[-1], 1])
-        arcs.append(np.diff(_arc(net.points[nodes])[crosses[nodes]]))
-    gaps = np.concatenate(arcs)
-    return float(np.median(gaps)) if len(gaps) else 0.1 * float(np.max(np.ptp(net.points, axis=0)))
-
-
-def _limits(quantity: _Colour, values: Array) -> tuple[float, float]:
-    """Round ends of a colour scale that shows all values and keeps 0 in its place."""
-    known = values[np.isfinite(values)]
-    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
-    most = max(-low, high)
-    if most <= 0.0:
-        return 0.0, 1.0
-    both = quantity.signed and low < -0.02 * high
-    step = _step(2.0 * most if both else most)
-    most = step * float(np.ceil(most / step - 1e-9))
-    return (-most if both else 0.0), most
-
-
-def _step(extent: float) -> float:
-    """A round distance between the labels of a scale: 1, 2 or 5 times a power of ten."""
-    power = 10.0 ** np.floor(np.log10(extent / 4.0))
-    return float(power * max(m for m in (1.0, 2.0, 5.0) if m * power <= extent / 4.0 * (1 + 1e-9)))
-
-
-def _tubes(lines: list[_Line], radius: float) -> pv.PolyData:
+def _tubes(lines: list[Line], radius: float) -> pv.PolyData:
     """Tubes around smooth curves through the nodes of all lines, with point data `values`."""
     points, values, polylines, start = [], [], [], 0
     for line in lines:
-        arc = _arc(line.points)
+        arc = arc_length(line.points)
         slopes = np.gradient(line.points, arc, axis=0, edge_order=2 if len(arc) > 2 else 1)
         fine = np.interp(np.arange((len(arc) - 1) * SPLITS + 1) / SPLITS, np.arange(len(arc)), arc)
         points.append(CubicHermiteSpline(arc, line.points, slopes)(fine))
@@ -258,27 +166,20 @@ def _tubes(lines: list[_Line], radius: float) -> pv.PolyData:
     return curves.tube(radius=radius, n_sides=SIDES, capping=True)
 
 
-def _light(plotter: Any) -> None:
-    """A key light from the upper left, a weaker fill from the right and one from behind."""
-    lights = (((-1.0, 0.9, 1.6), 0.78), ((1.4, 0.2, 0.8), 0.3), ((0.0, 1.0, -1.0), 0.12))
-    for place, intensity in lights:
-        plotter.add_light(pv.Light(position=place, light_type="camera light", intensity=intensity))
+def _unit(size: tuple[int, int]) -> float:
+    """Scale of what is written: 1 at 1600 x 1200."""
+    return min(size[0] / 4.0, size[1] / 3.0) / 400.0
 
 
-def _annotate(
-    plotter: Any,
-    scale: str,
-    limits: tuple[float, float],
-    step: float,
-    title: str | None,
-    size: tuple[int, int],
+def _scale(
+    plotter: Any, title: str, limits: tuple[float, float], step: float, size: tuple[int, int]
 ) -> None:
-    """The colour scale on the right, labelled at round values, and the title."""
-    unit = min(size[0] / 4.0, size[1] / 3.0) / 400.0  # 1 at 1600 x 1200
+    """The colour scale on the right, labelled at round values."""
+    unit = _unit(size)
     first, last = np.ceil(limits[0] / step - 1e-9), np.floor(limits[1] / step + 1e-9)
     labels = step * np.arange(first, last + 1.0) + 0.0  # no -0
     bar = plotter.add_scalar_bar(
-        title=scale,
+        title=title,
         vertical=True,
         position_x=0.87,
         position_y=0.17,
@@ -295,15 +196,6 @@ def _annotate(
     bar.SetUseCustomLabels(True)
     bar.SetCustomLabels(numpy_to_vtk(labels, deep=True))
     bar.SetLabelFormat("  %.4g")  # a text pad would shift the labels along the bar
-    if title is not None:
-        plotter.add_text(
-            title,
-            position=(0.03, 0.93),
-            viewport=True,
-            font_size=round(18 * unit),
-            font="arial",
-            color="#202020",
-        )
 
 
 def _aim(plotter: Any, view: str, clouds: list[Array], size: tuple[int, int]) -> None:
@@ -341,14 +233,3 @@ def _aim(plotter: Any, view: str, clouds: list[Array], size: tuple[int, int]) ->
         camera.enable_parallel_projection()
         camera.parallel_scale = half * distance
     plotter.renderer.ResetCameraClippingRange()
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep VTK from reporting that there is no screen before it renders without one."""
-    before = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
-    try:
-        yield
-    finally:
-        vtkLogger.SetStderrVerbosity(before)

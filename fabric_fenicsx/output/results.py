@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -52,6 +52,35 @@ class Results:
             return max(self.steps)
         return min(self.steps, key=lambda number: abs(self.steps[number] - time))
 
+    def frames(
+        self, count: int, *, mirror: bool = False
+    ) -> Iterator[tuple[Net, Snapshot, list[TriangleSurface]]]:
+        """Net, state and tools at times evenly spread over the run, linear between its steps.
+
+        Args:
+            count: how many; 1 is the last step.
+            mirror: the whole sheet of a quarter.
+
+        Raises:
+            InputError: a file of a step is broken.
+        """
+        numbers, times = list(self.steps), np.array(list(self.steps.values()))
+        for time in np.linspace(times[0], times[-1], count) if count > 1 else times[-1:]:
+            after = int(np.searchsorted(times, time))
+            before = max(after - 1, 0)
+            net, late, tools = self.at(numbers[after])
+            if after > before:
+                share = float((time - times[before]) / (times[after] - times[before]))
+                _, early, there = self.at(numbers[before])
+                late = _between(early, late, share)
+                tools = [
+                    replace(tool, place=(1.0 - share) * old.place + share * tool.place)
+                    for old, tool in zip(there, tools, strict=True)
+                ]
+            if mirror:
+                net, late = whole_sheet(net, late)
+            yield net, late, tools
+
     def at(
         self, number: int, *, mirror: bool = False
     ) -> tuple[Net, Snapshot, list[TriangleSurface]]:
@@ -70,6 +99,16 @@ class Results:
             net, snapshot = whole_sheet(net, snapshot)
         tools = [replace(t, place=places[t.name]) for t in self.tools if t.name in places]
         return net, snapshot, tools
+
+
+def _between(early: Snapshot, late: Snapshot, share: float) -> Snapshot:
+    """Linear between two snapshots; directors are then a little shorter than 1."""
+    return Snapshot(
+        **{
+            f.name: (1.0 - share) * getattr(early, f.name) + share * getattr(late, f.name)
+            for f in fields(Snapshot)
+        }
+    )
 
 
 def write_setup(

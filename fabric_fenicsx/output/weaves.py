@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgb
 from scipy.interpolate import CubicHermiteSpline
 
 from fabric_fenicsx.fabric.net import WARP, Net
-from fabric_fenicsx.output.pictures import _quiet
+from fabric_fenicsx.output.canvas import canvas, headline
 
 __all__ = ["draw_weave"]
 
@@ -24,6 +24,8 @@ COLOURS = ("#2f5d8a", "#d9a441")
 ROUND = 72  # points around a section
 SPLITS = 3  # pieces drawn for each cell
 FIBRES = 0.11  # strength of the streaks along a tow
+# A low key light from the left, so that the humps of the tows cast their shade; two fills.
+LIGHTS = (((-1.5, 0.7, 0.7), 0.72), ((1.2, 0.9, 1.0), 0.38), ((0.0, 0.0, 1.0), 0.14))
 TO_EYE, UP = (-0.36, -0.8, 0.72), (0.0, 0.0, 1.0)
 
 
@@ -59,42 +61,19 @@ def draw_weave(
         colour = np.array(to_rgb(COLOURS[0 if family == WARP else 1]))
         shades = np.clip(colour * light[:, None], 0.0, 1.0)
         ribbon["colour"] = (255.0 * shades).astype(np.uint8)
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with _quiet():
-        plotter: Any = pv.Plotter(off_screen=True, window_size=list(size), lighting="none")
-        try:
-            plotter.set_background("white")
-            _light(plotter)
-            plotter.add_mesh(
-                pv.merge(ribbons, merge_points=False),
-                scalars="colour",
-                rgb=True,
-                smooth_shading=True,
-                ambient=0.14,
-                specular=0.32,
-                specular_power=26.0,
-            )
-            if title is not None:
-                plotter.add_text(
-                    title,
-                    position=(0.03, 0.925),
-                    viewport=True,
-                    font_size=round(size[1] / 46),
-                    font="arial",
-                    color="#202020",
-                )
-            _aim(plotter, net.points, size)
-            plotter.enable_anti_aliasing("ssaa")
-            plotter.screenshot(str(path))
-        finally:
-            plotter.close()
-
-
-def _light(plotter: Any) -> None:
-    """A low key light from the left, so that the humps of the tows cast their shade; two fills."""
-    for place, intensity in (((-1.5, 0.7, 0.7), 0.72), ((1.2, 0.9, 1.0), 0.38), ((0, 0, 1), 0.14)):
-        plotter.add_light(pv.Light(position=place, light_type="camera light", intensity=intensity))
+    with canvas(path, size, LIGHTS) as plotter:
+        plotter.add_mesh(
+            pv.merge(ribbons, merge_points=False),
+            scalars="colour",
+            rgb=True,
+            smooth_shading=True,
+            ambient=0.14,
+            specular=0.32,
+            specular_power=26.0,
+        )
+        if title is not None:
+            headline(plotter, title, size[1] / 46)
+        _aim(plotter, net.points, size)
 
 
 def _ribbon(net: Net, tow: int, width: float, height: float) -> pv.PolyData:

@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fabric.net import WEFT, Net
-from ..fabric.sheet import Sheet, spaced_sheet
 from ..output.pictures import draw_net
 from ..output.snapshot import Snapshot
 from ..solving.model import Model, Support
@@ -20,21 +19,11 @@ from ..solving.simulation import Run, simulate
 from ..solving.stepping import StepControl
 from .cases import CantileverCase
 from .common import Session, crossover_law, extend, section, tow_net, write_table
+from .fabrics import strip
 
-__all__ = ["build", "midline", "run", "strip"]
+__all__ = ["build", "midline", "run"]
 
 Array = npt.NDArray[np.float64]
-
-
-def strip(case: CantileverCase, length: float) -> Sheet:
-    """A specimen of this overhang; warp tows across it, as many as fit."""
-    return spaced_sheet(
-        (0.0, length),
-        (0.0, case.width_mm),
-        case.warp_spacing_mm,
-        case.weft_spacing_mm,
-        subdivisions=case.subdivisions,
-    )
 
 
 def build(case: CantileverCase, length: float, session: Session) -> Model:

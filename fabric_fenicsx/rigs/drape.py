@@ -16,9 +16,7 @@ import numpy.typing as npt
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from ..fabric.crossings import reference_angle
-from ..fabric.layout import TowLayout
 from ..fabric.net import Net
-from ..fabric.sheet import Sheet, centred_sheet
 from ..geometry.distance import DistanceGrid
 from ..geometry.triangles import read_stl
 from ..mechanics.tools import HoledPlate, Mould, Sphere, Tool
@@ -31,24 +29,10 @@ from ..solving.parts import ContactLaw
 from ..solving.simulation import Run, simulate
 from .cases import ContactKeys, DrapeCase
 from .common import Session, control, crossover_law, extend, lowest, section, tow_net, write_table
-from .weave_keys import crossing_weights, layout
+from .fabrics import crossing_gap, flat_sheet
+from .weave_keys import crossing_weights
 
-__all__ = ["angles_at", "build", "flat_sheet", "run", "tools"]
-
-
-def flat_sheet(case: DrapeCase, session: Session) -> Sheet | TowLayout:
-    """The sheet of the case, or its quarter."""
-    keys = case.sheet
-    if case.weave is not None:
-        return layout(case.weave, keys, quarter=case.symmetry == "quarter", base=session.base)
-    return centred_sheet(
-        keys.width_mm,
-        keys.length_mm,
-        keys.warp_spacing_mm,
-        keys.weft_spacing_mm,
-        subdivisions=keys.subdivisions,
-        quarter=case.symmetry == "quarter",
-    )
+__all__ = ["angles_at", "build", "run", "tools"]
 
 
 def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
@@ -112,8 +96,7 @@ def contact_law(keys: ContactKeys) -> ContactLaw:
 def build(case: DrapeCase, session: Session) -> Model:
     """The model of a drape case. Collective."""
     keys, weave = case.sheet, case.weave
-    crimp = 0.0 if weave is None else weave.crimp_mm
-    net = tow_net(case, flat_sheet(case, session), session, crossing_gap=crimp)
+    net = tow_net(case, flat_sheet(case, session.base), session, crossing_gap=crossing_gap(case))
     return Model(
         net,
         section(case.tow),

@@ -15,13 +15,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fabric.net import Net
-from ..fabric.sheet import Sheet, spaced_sheet
 from ..output.pictures import draw_net
 from ..output.snapshot import Snapshot
 from ..solving.model import Model, Support
 from ..solving.simulation import simulate
 from .cases import PictureFrameCase
 from .common import Session, control, crossover_law, extend, section, tow_net, write_table
+from .fabrics import woven_sheet
 
 __all__ = ["build", "crosshead", "frame_angle", "frame_ends", "normalised_force", "run"]
 
@@ -55,22 +55,6 @@ def duration(case: PictureFrameCase) -> float:
     """Length of the whole test [s]."""
     out = 60.0 * case.travel_mm / case.rate_mm_min
     return out + case.hold_s + (out if case.unload else 0.0)
-
-
-def woven_sheet(case: PictureFrameCase) -> Sheet:
-    """Tows over the whole frame, crossing in the square of side L_fabric in its middle."""
-    frame, fabric = case.frame_length_mm, case.fabric_length_mm
-    middle = ((frame - fabric) / 2.0, (frame + fabric) / 2.0)
-    woven = spaced_sheet(
-        middle, middle, case.warp_spacing_mm, case.weft_spacing_mm, subdivisions=case.subdivisions
-    )
-    return Sheet(
-        (0.0, frame),
-        (0.0, frame),
-        woven.warp_positions,
-        woven.weft_positions,
-        subdivisions=case.subdivisions,
-    )
 
 
 def directions(gamma: float) -> tuple[Array, Array]:

@@ -1,0 +1,80 @@
+"""What a case would do, without doing it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from ..fabric.net import Net
+    from ..rigs.cases import Case
+
+__all__ = ["check"]
+
+
+def check(
+    case: Annotated[Path, typer.Argument(metavar="CASE.yaml", help="The case file.")],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Put a value over the file's."),
+    ] = None,
+) -> None:
+    """Validate a case and print what will be run, and about how long it takes.
+
+    Meshes the fabric and reads the files that the case names; solves nothing, writes nothing.
+    Exit code 2: the case cannot be run.
+    """
+    from rich.console import Console
+    from rich.table import Table
+
+    from ..rigs.estimate import estimate
+    from ..rigs.load import load_case
+
+    loaded = load_case(case, settings or [])
+    nets = _nets(loaded, case.parent)
+    console = Console(highlight=False)
+    console.print(f"{case}: {loaded.test}" + (f", {loaded.title}" if loaded.title else ""))
+    table = Table("fabric", "tows", "crossings", "nodes", "cells", "dofs")
+    for name, net in nets.items():
+        counts = (len(net.tow_family), len(net.crossings), len(net.points), len(net.cells))
+        table.add_row(name, *map(str, counts), str(6 * len(net.points)))
+    console.print(table)
+    cost = estimate(loaded, list(nets.values()))
+    console.print(
+        f"about {cost.steps} steps, {cost.iterations} iterations and {_time(cost.seconds)} on one "
+        "core; rough, by a factor of three either way. Forms that were never compiled here take "
+        "a minute or two more.",
+        soft_wrap=True,
+    )
+
+
+def _nets(case: Case, base: Path) -> dict[str, Net]:
+    """The nets of a case by name; files that it names are read."""
+    from tempfile import TemporaryDirectory
+
+    from ..fabric.gmsh_io import read_msh, write_msh
+    from ..rigs.fabrics import crossing_gap, fabrics
+
+    if (shape := getattr(case, "punch_stl", None)) is not None:
+        from ..geometry.triangles import read_stl
+
+        read_stl(base / shape)
+    gap = crossing_gap(case)
+    if case.mesh is not None:
+        return {case.mesh: read_msh(base / case.mesh, crossing_gap=gap)}
+    nets = {}
+    with TemporaryDirectory() as folder:
+        for name, fabric in fabrics(case, base).items():
+            path = Path(folder) / "tows.msh"
+            write_msh(fabric, path)
+            nets[name] = read_msh(path, crossing_gap=gap)
+    return nets
+
+
+def _time(seconds: float) -> str:
+    for limit, length, unit in ((90.0, 1.0, "s"), (5400.0, 60.0, "min")):
+        if seconds < limit:
+            return f"{seconds / length:.0f} {unit}"
+    return f"{seconds / 3600.0:.1f} h"

@@ -1,0 +1,36 @@
+"""A case file to begin with."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+from .results import listed, writable
+
+__all__ = ["new"]
+
+
+def new(
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="drape, picture_frame or cantilever.")],
+    out: Annotated[
+        Path | None,
+        typer.Argument(metavar="[FILE.yaml]", help="Default: RIG.yaml here. It must not exist."),
+    ] = None,
+) -> None:
+    """Write a commented case file: every key at its default, with unit and what is allowed."""
+    from ..rigs.keys import CASES
+    from ..rigs.write_case import template
+
+    listed("new", rig, CASES)
+    path = out or Path(f"{rig}.yaml")
+    if path.exists():
+        raise InputError(f"{path}: exists, allowed is a new file")
+    writable(path, (".yaml", ".yml"))
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(template(rig), encoding="utf-8")
+    os.replace(partial, path)
+    print(path)
