@@ -16,13 +16,14 @@ import numpy.typing as npt
 __all__ = ["Programme", "programme"]
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 #: A change of speed is a corner if it is this much of the largest speed ...
 LEAST_JUMP = 0.05
 #: ... and this many times the change over the readings around it.
 JUMP_RATIO = 4.0
-#: Points that a rate is taken from: enough to average the rounding of the record away.
-AROUND = 9
+#: Share of the largest speed by which two estimates of a rate may differ.
+DOUBT = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,14 +35,15 @@ class Programme:
         displacement: [mm], (n,).
         rate: its rate [mm/s] on the piece that a point belongs to, (n,).
         reading: index of the reading at each point; -1 for a corner between readings.
-        certain: whether the rate at each reading is known: not at a corner, (n_readings,).
+        certain: whether the rate at each reading is known: not at a corner, nor where the speed
+            changed faster than it was sampled, (n_readings,).
     """
 
     time: Array
     displacement: Array
     rate: Array
     reading: npt.NDArray[np.int64]
-    certain: npt.NDArray[np.bool_]
+    certain: Flags
 
 
 def programme(time: Array, displacement: Array) -> Programme:
@@ -55,6 +57,7 @@ def programme(time: Array, displacement: Array) -> Programme:
     edges = [-np.inf, *corners, np.inf]
     resolution = _resolution(displacement)
     rate = np.zeros_like(time)
+    top = float(np.abs(np.diff(displacement) / np.diff(time)).max())
     near = 1e-6 * float(np.ptp(time))
     certain = np.ones(len(time), dtype=bool)
     added: list[tuple[float, float, float]] = []
@@ -63,15 +66,17 @@ def programme(time: Array, displacement: Array) -> Programme:
         if len(inside) == 0:
             continue
         # A reading at a corner belongs to the piece before it.
-        rates = _rates(time[inside], displacement[inside], resolution)
+        rates, known = _rates(time[inside], displacement[inside], resolution, top)
         own = (time[inside] > low + near) | ~np.isfinite(low)
-        rate[inside[own]] = rates[own]
+        rate[inside[own]], certain[inside[own]] = rates[own], known[own]
     for corner in corners:
         at = np.abs(time - corner) <= near
         if at.any():
             certain[at] = False
         else:
             k = int(np.searchsorted(time, corner))
+            # Whether it was as sharp as it seems nobody saw.
+            certain[k - 1 : k + 1] = False
             # Reached along the piece before it.
             value = displacement[k - 1] + rate[k - 1] * (corner - time[k - 1])
             added.append((corner, float(value), float(rate[k - 1])))
@@ -100,22 +105,37 @@ def _resolution(values: Array) -> float:
     return 0.0
 
 
-def _rates(time: Array, displacement: Array, resolution: float) -> Array:
-    """Rate at each point of one piece, from the cubic through the points around it."""
+def _rates(time: Array, displacement: Array, resolution: float, top: float) -> tuple[Array, Flags]:
+    """Rate at each point of one piece, and whether it is known.
+
+    A quartic through the points around it; known where a parabola through the nearer half of them
+    agrees. Where the motion changes faster than it was sampled they differ.
+    """
     count = len(time)
+    if count < 3:
+        slope = float((displacement[-1] - displacement[0]) / np.ptp(time)) if count == 2 else 0.0
+        return np.full(count, slope), np.zeros(count, dtype=bool)
     if np.ptp(displacement) <= 2.0 * resolution:
-        return np.zeros(count)
-    if count < 5:
-        return np.full(count, np.polyfit(time - time[0], displacement, 1)[0])
-    width = min(AROUND, count)
-    rates = np.empty(count)
+        return np.zeros(count), np.ones(count, dtype=bool)
+    step = np.ptp(time) / (count - 1)
+    # Wide enough for the rounding of the record to average out.
+    half = int(np.clip(np.ceil(resolution / (0.1 * DOUBT * top * step)), 1, 6))
+    near, far = np.empty(count), np.empty(count)
     for i in range(count):
-        first = min(max(i - width // 2, 0), count - width)
-        own = slice(first, first + width)
-        scale = time[own][-1] - time[own][0]
-        cubic = np.polyfit((time[own] - time[i]) / scale, displacement[own], min(3, width - 2))
-        rates[i] = cubic[-2] / scale
-    return rates
+        near[i] = _slope_at(time, displacement, i, half, 2)
+        far[i] = _slope_at(time, displacement, i, 2 * half, 4)
+    return far, np.abs(far - near) < DOUBT * top
+
+
+def _slope_at(time: Array, values: Array, i: int, half: int, degree: int) -> float:
+    """Slope at a point of the polynomial through those up to ``half`` away on either side."""
+    count = len(time)
+    width = min(2 * half + 1, count)
+    first = min(max(i - half, 0), count - width)
+    own = slice(first, first + width)
+    scale = float(np.ptp(time[own]))
+    fitted = np.polyfit((time[own] - time[i]) / scale, values[own], min(degree, width - 1))
+    return float(fitted[-2]) / scale
 
 
 def _corners(time: Array, displacement: Array) -> list[float]:
