@@ -168,6 +168,7 @@ def test_drape_with_a_holder_force(tmp_path):
         file.unlink()
     _, resumed = run(again, resume=True)
     columns = ["holder_height_mm", "external_work_N_mm", "lost_N_mm", "stored_N_mm"]
+    columns += ["impulse_z_N_s", "angular_impulse_x_N_mm_s"]
     assert resumed.iloc[-1][columns].to_numpy() == pytest.approx(last[columns].to_numpy(), rel=1e-5)
 
 

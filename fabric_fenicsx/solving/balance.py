@@ -2,9 +2,13 @@
 
     work of tools, supports and weight = stored + kinetic + lost + remainder
 
+    change of momentum = impulse of weight, tools, supports and nodal loads
+
 Work of what moves by prescription is taken with the mean of the force before and after the step,
 weight exactly, losses with the force at the end of the step. The remainder is the numerical damping
-of the time integration and the error of these sums; both vanish with the step.
+of the time integration and the error of these sums; both vanish with the step. Impulses are summed
+likewise, the force of the first step being that at its end; a run starts at rest. Momentum and
+impulse are about the origin, see solving.momentum.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .model import Model
+from .momentum import Momentum
 
 __all__ = ["Balance"]
 
@@ -38,9 +43,15 @@ class Balance:
         }
         self._tool_place = {tool.name: model.tool_place(tool.name) for tool in model.tools}
         self._reaction: Array | None = None
+        self._time = past.get("time_s", 0.0)
+        self._momentum = None if model.alpha is None else Momentum(model)
+        self._impulse = _read(past, "impulse_{}_N_s", "angular_impulse_{}_N_mm_s")
+        self._wrench = None
+        if "external_force_x_N" in past:
+            self._wrench = _read(past, "external_force_{}_N", "external_moment_{}_N_mm")
 
-    def step(self) -> dict[str, float]:
-        """Columns for a converged step, its increment still in the fields."""
+    def step(self, time: float) -> dict[str, float]:
+        """Columns for a converged step that ends at ``time``, its increment still in the fields."""
         model = self.model
         row: dict[str, float] = {}
         forces = model.tool_forces()
@@ -59,13 +70,31 @@ class Balance:
         kinetic = energies.get("inertia", 0.0)
         stored = sum(energies.values()) - kinetic
         row |= {f"energy_{name.replace(' ', '_')}_N_mm": e for name, e in energies.items()}
-        return row | {
-            "external_work_N_mm": self.external,
-            "stored_N_mm": stored,
-            "kinetic_N_mm": kinetic,
-            "lost_N_mm": self.lost,
-            "remainder_N_mm": self.external - stored - kinetic - self.lost,
-        }
+        return (
+            row
+            | self._momenta(time)
+            | {
+                "external_work_N_mm": self.external,
+                "stored_N_mm": stored,
+                "kinetic_N_mm": kinetic,
+                "lost_N_mm": self.lost,
+                "remainder_N_mm": self.external - stored - kinetic - self.lost,
+            }
+        )
+
+    def _momenta(self, time: float) -> dict[str, float]:
+        """Momentum, impulse and what acts from outside; nothing in statics."""
+        if self._momentum is None:
+            return {}
+        wrench = self._momentum.external()
+        before = wrench if self._wrench is None else self._wrench
+        self._impulse += (before + wrench) / 2.0 * (time - self._time)
+        self._wrench, self._time = wrench, time
+        columns = _columns(
+            self._momentum.momentum(), "momentum_{}_N_s", "angular_momentum_{}_N_mm_s"
+        )
+        columns |= _columns(self._impulse, "impulse_{}_N_s", "angular_impulse_{}_N_mm_s")
+        return columns | _columns(wrench, "external_force_{}_N", "external_moment_{}_N_mm")
 
     def _support_work(self) -> float:
         """Work of the supports over the step; only those that move do any."""
@@ -79,3 +108,15 @@ class Balance:
             model.fields.w.x.array.reshape(-1, 6)[: model.disc.owned, :3]
         )
         return float(np.sum((reaction + before) / 2.0 * increment))
+
+
+def _columns(values: Array, first: str, second: str) -> dict[str, float]:
+    """Six numbers under the names of x, y and z."""
+    names = [name.format(axis) for name in (first, second) for axis in "xyz"]
+    return dict(zip(names, values.tolist(), strict=True))
+
+
+def _read(past: dict[str, float], first: str, second: str) -> Array:
+    """The six numbers of a recorded step; 0 where there was none."""
+    names = [name.format(axis) for name in (first, second) for axis in "xyz"]
+    return np.array([past.get(name, 0.0) for name in names])

@@ -54,6 +54,9 @@ class Support:
 class Model:
     """The paper's model of a net, on a communicator.
 
+    ``mass`` holds (ρA, ρI about the directors) of each cell of the net, (n_cells, 4) [tonne/mm,
+    tonne mm].
+
     Args:
         net: the net, on every rank.
         section: the section of all tows, or one each for warp and weft.
@@ -99,7 +102,7 @@ class Model:
         pair = section if isinstance(section, tuple) else (section, section)
         family = net.tow_family[net.cell_tow]
         stiffness = diagonals(pair)[family]
-        mass = np.array([s.mass() for s in pair])[family]
+        mass = self.mass = np.array([s.mass() for s in pair])[family]
         self.net, self.comm = net, comm
         self.time = 0.0
         self._supports = list(supports)
@@ -298,6 +301,24 @@ class Model:
         F = self.disc.vector()
         self.system.residual(F)
         return self.disc.gather_nodes(F.array_r.reshape(-1, BLOCK))
+
+    def external_work(self) -> Array:
+        """Virtual work of all that acts from outside, on w of this rank's nodes, (n_owned, 6).
+
+        Weight, tools, supports and nodal loads [N, N mm].
+        """
+        own = self.disc.owned
+        F = self.disc.vector()
+        self.system.residual(F)
+        work = np.zeros((own, BLOCK))
+        first = int(self.disc.global_blocks[0]) * BLOCK if own else 0
+        work.ravel()[self.fixed - first] = F.array_r[self.fixed - first]
+        work += self.system.load_work()
+        if np.any(self._full_gravity):
+            work -= self.system.term_forces("weight")
+        for tool in self.tools:
+            work[:, :3] -= self._on_nodes(tool)
+        return work
 
     def snapshot(self, time: float) -> Snapshot:
         """The state at the increment set last, in the order of the net, on every rank.

@@ -148,7 +148,7 @@ class Record:
             "iterations": step.iterations,
             "failed_attempts": step.failures,
         }
-        row |= self._balance.step()
+        row |= self._balance.step(step.time)
         row |= measure(snapshot)
         self.rows.append(row)
         if self._root:

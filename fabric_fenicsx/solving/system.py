@@ -166,6 +166,10 @@ class System:
         A.assemble()
         self.assemble_seconds += perf_counter() - start
 
+    def load_work(self) -> Array:
+        """Virtual work of the nodal loads on w of the owned blocks, (n_owned, 6) [N, N mm]."""
+        return self._load_work()[0]
+
     def _load_work(self) -> tuple[Array, Array]:
         """What the nodal loads do on v, and the derivative of their turning part in θ.
 
