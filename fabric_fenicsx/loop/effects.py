@@ -26,13 +26,13 @@ class Parameter:
 
     Attributes:
         name: with its unit at the end, as k1_N.
-        starts: values from which a fit is begun; for an amplitude none are needed, as the model
-            is all but linear in it.
+        starts: values from which a fit is begun; an amplitude that the model is all but linear in
+            needs none.
         lower, upper: bounds.
         amplitude: whether it is the strength of an effect, zero in the baseline.
         meaning: one line for the report.
-        share_of: "duration", "angle" or "rate": starts and bounds are shares of the longest run,
-            of the largest shear angle or of the largest rate in the data.
+        share_of: "duration", "angle", "rate" or "travel": starts and bounds are shares of the
+            longest run, or of the largest shear angle, rate or displacement in the data.
     """
 
     name: str
@@ -71,12 +71,12 @@ class Variant:
         """The other numbers."""
         return tuple(p for p in self.parameters if not p.amplitude)
 
-    def grid(self) -> list[dict[str, float]]:
-        """Every combination of the starts of its shapes."""
-        names = [p.name for p in self.shapes]
+    def grid(self, *, amplitudes: bool) -> list[dict[str, float]]:
+        """Every combination of the starts of its shapes, and of its amplitudes if wanted."""
+        chosen = [p for p in self.parameters if p.starts and (amplitudes or not p.amplitude)]
         return [
-            dict(zip(names, starts, strict=True))
-            for starts in product(*(p.starts for p in self.shapes))
+            dict(zip((p.name for p in chosen), starts, strict=True))
+            for starts in product(*(p.starts for p in chosen))
         ]
 
 

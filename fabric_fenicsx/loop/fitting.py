@@ -13,7 +13,15 @@ from ..errors import SolveError
 from .effects import Parameter, Variant
 from .experiment import Experiment, Flags
 
-__all__ = ["Fit", "fit", "fit_from_grid", "orthogonal_to", "parameters_of", "signatures"]
+__all__ = [
+    "Fit",
+    "Signature",
+    "fit",
+    "fit_from_grid",
+    "orthogonal_to",
+    "parameters_of",
+    "signatures",
+]
 
 Array = npt.NDArray[np.float64]
 
@@ -178,20 +186,24 @@ def fit_from_grid(
         The model with each form that has a solution.
     """
     rows = base.used
-    r = (base.residual * base.weight)[rows]
+    weight = base.weight[rows]
+    observed = experiment.readings.observed[rows]
     promising: list[tuple[float, int, Variant, dict[str, float]]] = []
     for variant in variants:
         if set(base.values) & {p.name for p in variant.parameters}:
             continue
         own: list[tuple[float, int, Variant, dict[str, float]]] = []
-        for shape, columns in signatures(experiment, base, variant):
-            J = np.column_stack([c[rows] for c in columns.values()]) * base.weight[rows, None]
+        for one in signatures(experiment, base, variant, amplitudes=True):
+            r = (observed - one.expected[rows]) * weight
+            J = np.column_stack([c[rows] * weight for c in one.slopes.values()])
+            if not (np.isfinite(J).all() and np.isfinite(r).all()):
+                continue
             scale = np.linalg.norm(J, axis=0)
             scale[scale == 0.0] = 1.0
             step = np.linalg.lstsq(J / scale, r, rcond=1e-10)[0] / scale
-            moved = dict(base.values) | shape
-            for name, change in zip(columns, step.tolist(), strict=True):
-                moved[name] = moved.get(name, 0.0) + change
+            moved = dict(one.at)
+            for name, change in zip(one.slopes, step.tolist(), strict=True):
+                moved[name] += change
             for p in variant.amplitudes:
                 moved[p.name] = max(moved[p.name], _least(p, moved[p.name]))
             left = float(np.sum((r - J @ step) ** 2))
@@ -211,21 +223,39 @@ def fit_from_grid(
     return fits
 
 
-def signatures(
-    experiment: Experiment, base: Fit, variant: Variant
-) -> list[tuple[dict[str, float], dict[str, Array]]]:
-    """The model's sensitivities with an effect at zero amplitude, for each shape of it.
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """The model with a little of an effect.
 
-    Returns:
-        For each combination of the shape's starts: it, and by parameter of the fitted model and by
-        amplitude of the effect the derivative of every reading, (n,) each.
+    Attributes:
+        at: values of all parameters.
+        expected: readings there, (n,).
+        slopes: their derivatives, (n,) each, by parameter of the fitted model and by amplitude of
+            the effect.
+    """
+
+    at: dict[str, float]
+    expected: Array
+    slopes: dict[str, Array]
+
+
+def signatures(
+    experiment: Experiment, base: Fit, variant: Variant, *, amplitudes: bool
+) -> list[Signature]:
+    """The model's sensitivities to an effect, for each shape of it.
+
+    Args:
+        experiment: the test.
+        base: the model so far.
+        variant: the effect's form.
+        amplitudes: also at the starts of its amplitudes, where it has any; else all but at zero.
     """
     found = []
     names = [*base.values, *(p.name for p in variant.amplitudes)]
-    for shape in variant.grid():
-        at = base.values | shape | {p.name: SMALL for p in variant.amplitudes}
-        _, slopes = experiment.predict((*base.variants, variant), at)
-        found.append((shape, {name: slopes[name] for name in names}))
+    for shape in variant.grid(amplitudes=amplitudes):
+        at = base.values | {p.name: SMALL for p in variant.amplitudes} | shape
+        expected, slopes = experiment.predict((*base.variants, variant), at)
+        found.append(Signature(at, expected, {name: slopes[name] for name in names}))
     return found
 
 

@@ -85,6 +85,7 @@ class PictureFrame:
             "duration": max(float(p.time[-1] - p.time[0]) for p in programmes),
             "angle": float(np.abs(gamma).max()),
             "rate": float(np.abs(rate).max()),
+            "travel": float(np.abs(self._points["D"].value).max()),
         }
         self.effects = [_scaled(e, shares) for e in (*PICTURE_FRAME_EFFECTS, *own)]
 

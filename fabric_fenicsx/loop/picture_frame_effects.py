@@ -32,7 +32,7 @@ ROUNDING = Parameter(
     "rounding_rad_s",
     (1e-3, 0.1),
     1e-4,
-    1.0,
+    0.3,
     meaning="rate below which the friction falls off",
     share_of="rate",
 )
@@ -47,7 +47,13 @@ LOCKING_ANGLE = Parameter(
 OFFSET = Parameter("offset_N", amplitude=True, meaning="reading at no load")
 DRIFT = Parameter("drift_N_s", amplitude=True, meaning="change of the reading per second")
 TRAVEL = Parameter(
-    "free_travel_mm", lower=0.0, amplitude=True, meaning="crosshead travel before engagement"
+    "free_travel_mm",
+    (0.003, 0.012, 0.03, 0.06),
+    0.0,
+    0.3,
+    amplitude=True,
+    meaning="crosshead travel before engagement",
+    share_of="travel",
 )
 
 

@@ -212,7 +212,8 @@ class _Search:
             self.progress(0.1 * k / len(self.tried), f"score {effect.name}")
             best, smallest = 0.0, 1.0
             for variant in effect.variants:
-                for _, columns in signatures(self.experiment, base, variant):
+                for one in signatures(self.experiment, base, variant, amplitudes=False):
+                    columns = one.slopes
                     count += 1
                     J = np.column_stack([columns[n][rows] * weight for n in base.values])
                     own = np.column_stack(
