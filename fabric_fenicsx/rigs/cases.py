@@ -28,6 +28,7 @@ __all__ = [
     "SheetKeys",
     "SolverKeys",
     "TowKeys",
+    "TowTypeKeys",
 ]
 
 
@@ -46,6 +47,38 @@ class TowKeys(Keys):
     relaxation_time_s: NotNegative = Field(
         1.0, description="viscosity of bending and twist as a relaxation time; 0: elastic"
     )
+
+
+class TowTypeKeys(Keys):
+    """Tows that differ from those of `tow`; what is not given is as there."""
+
+    family: Literal["warp", "weft"] = Field(description="whose tows")
+    repeat: Annotated[int, Field(ge=1)] = Field(
+        1, description="the pattern of types repeats after this many tows"
+    )
+    tows: list[Annotated[int, Field(ge=0)]] = Field(
+        [0],
+        min_length=1,
+        description="which of the repeat's tows, from 0; the first tow of the sheet, in a quarter "
+        "the one nearest to the symmetry plane, is 0",
+    )
+    width_mm: Positive | None = Field(None, description="as in tow")
+    height_mm: Positive | None = Field(None, description="as in tow")
+    density_kg_mm3: Positive | None = Field(None, description="as in tow")
+    C1_MPa: Positive | None = Field(None, description="as in tow")
+    D1_per_MPa: NotNegative | None = Field(None, description="as in tow")
+    shear_correction: Positive | None = Field(None, description="as in tow")
+
+    @model_validator(mode="after")
+    def _tows_are_in_the_repeat(self) -> TowTypeKeys:
+        if max(self.tows) >= self.repeat:
+            raise ValueError(f"tows: {max(self.tows)}, allowed is 0 to repeat - 1")
+        return self
+
+    def of(self, tow: TowKeys) -> TowKeys:
+        """The keys of these tows where the others have ``tow``."""
+        given = self.model_dump(exclude={"family", "repeat", "tows"}, exclude_none=True)
+        return tow.model_copy(update=given)
 
 
 class CrossoverKeys(Keys):
@@ -125,6 +158,9 @@ class Common(Keys):
 
     title: str = Field("", description="free text")
     tow: TowKeys = Field(default_factory=TowKeys, description="the virtual tows")
+    tow_types: list[TowTypeKeys] = Field(
+        default_factory=list, description="tows of another section within warp or weft"
+    )
     crossover: CrossoverKeys = Field(default_factory=CrossoverKeys, description="the crossings")
     mesh: str | None = Field(
         None, description="a .msh with the groups warp, weft and tow_ends, instead of `sheet`"

@@ -17,9 +17,10 @@ import numpy.typing as npt
 import pandas as pd
 
 from ..errors import InputError
+from ..fabric.crossings import tow_numbers
 from ..fabric.gmsh_io import read_msh, write_msh
 from ..fabric.layout import TowLayout
-from ..fabric.net import Net
+from ..fabric.net import WARP, WEFT, Net
 from ..fabric.section import RectangularSection
 from ..fabric.sheet import Sheet
 from ..solving.parts import CrossoverLaw
@@ -33,6 +34,7 @@ __all__ = [
     "extend",
     "section",
     "tow_net",
+    "tow_sections",
     "write_table",
 ]
 
@@ -77,6 +79,32 @@ def section(keys: TowKeys) -> RectangularSection:
         D1=keys.D1_per_MPa,
         shear_correction=keys.shear_correction,
     )
+
+
+def tow_sections(
+    case: Common, net: Net
+) -> tuple[tuple[RectangularSection, ...], npt.NDArray[np.int64]]:
+    """The sections of a case's tows, and which of them each tow of the net has, (n_tows,).
+
+    Raises:
+        InputError: two types claim the same tow.
+    """
+    sections = [section(case.tow)]
+    kind = np.zeros(len(net.tow_family), dtype=np.int64)
+    if not case.tow_types:
+        return tuple(sections), kind
+    numbers = tow_numbers(net)
+    for i, keys in enumerate(case.tow_types):
+        family = WARP if keys.family == "warp" else WEFT
+        own = (net.tow_family == family) & np.isin(numbers % keys.repeat, keys.tows)
+        if kind[own].any():
+            number = int(numbers[own & (kind > 0)].min())
+            raise InputError(
+                f"tow_types.{i}: {keys.family} tow {number} has a type already, allowed is one"
+            )
+        kind[own] = len(sections)
+        sections.append(section(keys.of(case.tow)))
+    return tuple(sections), kind
 
 
 def crossover_law(keys: CrossoverKeys, warp_spacing: float, weft_spacing: float) -> CrossoverLaw:

@@ -28,7 +28,16 @@ from ..solving.model import Model, Support
 from ..solving.parts import ContactLaw
 from ..solving.simulation import Run, simulate
 from .cases import ContactKeys, DrapeCase
-from .common import Session, control, crossover_law, extend, lowest, section, tow_net, write_table
+from .common import (
+    Session,
+    control,
+    crossover_law,
+    extend,
+    lowest,
+    tow_net,
+    tow_sections,
+    write_table,
+)
 from .fabrics import crossing_gap, flat_sheet
 from .weave_keys import crossing_weights
 
@@ -97,9 +106,11 @@ def build(case: DrapeCase, session: Session) -> Model:
     """The model of a drape case. Collective."""
     keys, weave = case.sheet, case.weave
     net = tow_net(case, flat_sheet(case, session.base), session, crossing_gap=crossing_gap(case))
+    sections, kind = tow_sections(case, net)
     return Model(
         net,
-        section(case.tow),
+        sections,
+        tow_section=kind,
         section_law=case.tow.section_law,
         crossovers=crossover_law(case.crossover, keys.warp_spacing_mm, keys.weft_spacing_mm),
         gravity=(0.0, 0.0, -case.gravity_mm_s2),

@@ -59,7 +59,9 @@ class Model:
 
     Args:
         net: the net, on every rank.
-        section: the section of all tows, or one each for warp and weft.
+        section: the section of all tows, or one each for warp and weft, or those that
+            ``tow_section`` counts.
+        tow_section: which of the sections each tow has, (n_tows,); by default its family's.
         section_law: "linear" takes the sections' stiffness at zero strain, "neo_hookean" the
             whole energy of rectangular ones.
         crossovers: law of the crossings; not needed where the net has none.
@@ -82,8 +84,9 @@ class Model:
     def __init__(
         self,
         net: Net,
-        section: Section | tuple[Section, Section],
+        section: Section | tuple[Section, ...],
         *,
+        tow_section: npt.NDArray[np.int64] | None = None,
         section_law: SectionLawName = "linear",
         crossovers: CrossoverLaw | None = None,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -99,10 +102,10 @@ class Model:
         extra: Callable[[TowFields, ConnectorFields | None], Sequence[Term]] | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
-        pair = section if isinstance(section, tuple) else (section, section)
-        family = net.tow_family[net.cell_tow]
-        stiffness = diagonals(pair)[family]
-        mass = self.mass = np.array([s.mass() for s in pair])[family]
+        sections = section if isinstance(section, tuple) else (section, section)
+        kind = (net.tow_family if tow_section is None else tow_section)[net.cell_tow]
+        stiffness = diagonals(sections)[kind]
+        mass = self.mass = np.array([s.mass() for s in sections])[kind]
         self.net, self.comm = net, comm
         self.time = 0.0
         self._supports = list(supports)
@@ -110,7 +113,7 @@ class Model:
         self.fields = self.disc.tows
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
         self._full_gravity, self._load = np.array(gravity), load
-        self.elastic = elastic_section(self.disc, pair, family, section_law)
+        self.elastic = elastic_section(self.disc, sections, kind, section_law)
         self._constants(mass_scale)
         self.histories = Histories(self.disc)
         self.histories.add("strain", "cells", self.fields.strain_n, beam.strain(self.fields))

@@ -1,4 +1,4 @@
-"""The sections of a model: from numbers per family of tows to a law with its fields."""
+"""The sections of a model: from numbers per kind of tow to a law with its fields."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ def diagonals(sections: Sequence[Section]) -> npt.NDArray[np.float64]:
 def elastic_section(
     disc: Discretisation,
     sections: Sequence[Section],
-    family: npt.NDArray[np.int64],
+    kind: npt.NDArray[np.int64],
     law: SectionLawName,
 ) -> ElasticSection:
     """The law of all tows: the simplest that covers every section.
 
     Args:
         disc: the discretised net; its fields hold the diagonals already.
-        sections: of each family.
-        family: of each cell of the net, shape (n_cells,).
+        sections: of each kind of tow.
+        kind: of each cell of the net, shape (n_cells,).
         law: "linear" for the stiffness at zero strain, "neo_hookean" for the whole energy.
 
     Raises:
@@ -51,7 +51,7 @@ def elastic_section(
         if not d.any():
             return neo_hookean_section()
         space = _dolfinx.constants_per_cell(mesh, 1)
-        return neo_hookean_section(disc.cell_field(space, d[family]))
+        return neo_hookean_section(disc.cell_field(space, d[kind]))
     if law != "linear":
         raise ValueError(f"unknown section law {law!r}: linear and neo_hookean are known")
     matrices = [s.stiffness() for s in sections]
@@ -61,4 +61,4 @@ def elastic_section(
     full = [np.diag(C) if C.ndim == 1 else C for C in matrices]
     packed = np.array([C[rows, columns] for C in full])
     space = _dolfinx.constants_per_cell(mesh, len(PACKED))
-    return coupled_section(disc.cell_field(space, packed[family]))
+    return coupled_section(disc.cell_field(space, packed[kind]))
