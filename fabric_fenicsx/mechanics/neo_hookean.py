@@ -49,6 +49,18 @@ Read the other way this says that the six stiffnesses and d determine the law: 2
 E A/9, a² = 12 E I_in/E A, b² = 12 E I_out/E A. It therefore needs no field but those that the
 linear law has (and d).
 
+Twist and stretch. In (2) the fibre at (y, z) of a twisted tow is sheared by K1 (y, z) and keeps its
+λ: nothing couples N to K1 at D1 = 0. A flat section warps instead, by −K1 y z along the tow: the
+shear γ3 vanishes, the fibre turns with its surroundings and is as long as the helix that it is,
+
+    λ_f = √(λ² + K1² (y² + z²)),                                                         (9)
+
+so that a twisted tow shortens, Γ1 = −K1² (I_out + I_in)/2A where N = 0, or is pulled with
+N = E (I_out + I_in) K1²/2 where its ends are held (Wagner's effect; z² is of no weight in a flat
+section and makes (9) the form of the textbooks, V. Z. Vlasov, Thin-walled elastic beams). With
+``fibres`` λ_f takes the place of λ in (5) to (8). It is not for round sections: without warping a
+held rod of this material pushes, N = −C1 (I_out + I_in) K1² (Rivlin, Phil. Trans. A 242, 1949).
+
 A point pressed to λ ≤ 0 has no energy; a Newton step that throws one there fails, and the step
 is cut.
 """
@@ -74,13 +86,14 @@ HALLEY = 3
 
 
 def neo_hookean_section(
-    compressibility: Any | None = None, *, points: int = POINTS
+    compressibility: Any | None = None, *, fibres: bool = False, points: int = POINTS
 ) -> ElasticSection:
     """The law of a Neo-Hookean rectangle with the stiffness of ``fields.stiffness`` at zero strain.
 
     Args:
         compressibility: d = C1 D1 [-] in each cell, shear modulus over bulk modulus; None for the
             incompressible law, where shear and torsion are linear.
+        fibres: whether twist stretches the fibres off the axis, (9).
         points: Gauss points per side of the rectangle.
     """
     xi, weight = np.polynomial.legendre.leggauss(points)
@@ -96,26 +109,36 @@ def neo_hookean_section(
         a, b = sqrt(12 * inside / EA), sqrt(12 * out / EA)
         return [(eta * a, zeta * b, w) for eta, zeta, w in rule]
 
-    def stretch(e: Any, y: Any, z: Any) -> Any:
-        return 1 + e[0] + e[4] * z - e[5] * y
+    def stretch(e: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
+        """λ of a fibre and its derivatives in Γ1 and in K1."""
+        lam = 1 + e[0] + e[4] * z - e[5] * y
+        if not fibres:
+            return lam, 1, 0
+        off = e[3] * (y * y + z * z)
+        fibre = sqrt(lam * lam + e[3] * off)
+        return fibre, lam / fibre, off / fibre
 
     def incompressible_forces(fields: TowFields, e: Any) -> Any:
         C = fields.stiffness
-        p = [(_uniaxial(stretch(e, y, z)), y, z, w) for y, z, w in over_section(fields)]
-        N1 = C[0] / 3 * sum(w * s for s, y, z, w in p)
-        M2 = C[0] / 3 * sum(w * z * s for s, y, z, w in p)
-        M3 = -C[0] / 3 * sum(w * y * s for s, y, z, w in p)
-        return as_vector([N1, C[1] * e[1], C[2] * e[2], C[3] * e[3], M2, M3])
+        N1 = M1 = M2 = M3 = 0
+        for y, z, w in over_section(fields):
+            lam, axial, twisting = stretch(e, y, z)
+            force = C[0] / 3 * w * _uniaxial(lam)
+            N1 += force * axial
+            M1 += force * twisting
+            M2 += z * force * axial
+            M3 -= y * force * axial
+        return as_vector([N1, C[1] * e[1], C[2] * e[2], C[3] * e[3] + M1, M2, M3])
 
     def incompressible_energy(fields: TowFields, e: Any) -> Any:
         C = fields.stiffness
         # λ² + 2/λ − 3, without its cancellation.
-        lam = [(stretch(e, y, z), w) for y, z, w in over_section(fields)]
+        lam = [(stretch(e, y, z)[0], w) for y, z, w in over_section(fields)]
         axial = C[0] / 6 * sum(w * (s - 1) * (s - 1) * (s + 2) / s for s, w in lam)
         return axial + sum(C[i] * e[i] * e[i] / 2 for i in (1, 2, 3))
 
     def sheared(fields: TowFields, e: Any) -> tuple[Any, Any, list[tuple[Any, ...]]]:
-        """2 C1 A, the factors on Γ2, Γ3 and K1, and λ, γ2, γ3, j, y, z, weight of each point."""
+        """2 C1 A, the factors on Γ2, Γ3 and K1, and of each point λ, γ, j, place and weight."""
         C, d = fields.stiffness, compressibility
         assert d is not None
         GA = C[0] * (3 + d) / 9
@@ -127,27 +150,29 @@ def neo_hookean_section(
         f2, f3, f1 = factors
         found = []
         for y, z, w in over_section(fields):
-            lam = stretch(e, y, z)
+            lam, axial, twisting = stretch(e, y, z)
             g2, g3 = f2 * e[1] - f1 * e[3] * z, f3 * e[2] + f1 * e[3] * y
             j = _lateral_balance(lam, lam * lam + g2 * g2 + g3 * g3, d)
-            found.append((lam, g2, g3, j, y, z, w))
+            found.append((lam, axial, twisting, g2, g3, j, y, z, w))
         return GA, factors, found
 
     def compressible_forces(fields: TowFields, e: Any) -> Any:
         GA, (f2, f3, f1), found = sheared(fields, e)
         total = [0.0] * 6
-        for lam, g2, g3, j, y, z, w in found:
+        for lam, axial, twisting, g2, g3, j, y, z, w in found:
             scale = w / (j * j)
-            p = scale * (lam - j * j * j / (lam * lam))
+            fibre = scale * (lam - j * j * j / (lam * lam))
+            p = fibre * axial
             q2, q3 = scale * g2, scale * g3
-            parts = (p, f2 * q2, f3 * q3, f1 * (y * q3 - z * q2), z * p, -y * p)
+            twist = f1 * (y * q3 - z * q2) + fibre * twisting
+            parts = (p, f2 * q2, f3 * q3, twist, z * p, -y * p)
             total = [s + part for s, part in zip(total, parts, strict=True)]
         return as_vector([GA * s for s in total])
 
     def compressible_energy(fields: TowFields, e: Any) -> Any:
         GA, _, found = sheared(fields, e)
         total = 0.0
-        for lam, g2, g3, j, _, _, w in found:
+        for lam, _, _, g2, g3, j, _, _, w in found:
             Q, jj = lam * lam + g2 * g2 + g3 * g3, j * j
             t = Q / (jj * jj * j) - 1 / (jj * lam)
             total += w * ((Q + 2 * jj * j / lam) / jj - 3 + compressibility * t * t / 9)

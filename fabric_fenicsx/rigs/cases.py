@@ -40,8 +40,10 @@ class TowKeys(Keys):
     density_kg_mm3: Positive = Field(7.0e-6, description="ρ")
     C1_MPa: Positive = Field(60000.0, description="Neo-Hookean constant; E = 6 C1, G = 2 C1")
     D1_per_MPa: NotNegative = Field(0.0, description="compressibility; 0: incompressible")
-    section_law: Literal["linear", "neo_hookean"] = Field(
-        "linear", description="linearised at zero strain, or integrated over the section"
+    section_law: Literal["linear", "neo_hookean", "neo_hookean_fibres"] = Field(
+        "linear",
+        description="linearised at zero strain, or integrated over the section; _fibres: twist "
+        "stretches the fibres of a flat tow off its axis, which shortens it",
     )
     shear_correction: Positive = Field(5.0 / 6.0, description="factor on the shear stiffness")
     relaxation_time_s: NotNegative = Field(

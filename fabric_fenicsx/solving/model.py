@@ -63,7 +63,7 @@ class Model:
             ``tow_section`` counts.
         tow_section: which of the sections each tow has, (n_tows,); by default its family's.
         section_law: "linear" takes the sections' stiffness at zero strain, "neo_hookean" the
-            whole energy of rectangular ones.
+            whole energy of rectangular ones, "neo_hookean_fibres" with stretch by twist.
         crossovers: law of the crossings; not needed where the net has none.
         gravity: acceleration [mm/s²].
         load: factor on gravity at a time; by default 1.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ from .discretisation import Discretisation
 
 __all__ = ["SectionLawName", "diagonals", "elastic_section"]
 
-SectionLawName = Literal["linear", "neo_hookean"]
+SectionLawName = Literal["linear", "neo_hookean", "neo_hookean_fibres"]
 
 
 def diagonals(sections: Sequence[Section]) -> npt.NDArray[np.float64]:
@@ -37,23 +37,26 @@ def elastic_section(
         disc: the discretised net; its fields hold the diagonals already.
         sections: of each kind of tow.
         kind: of each cell of the net, shape (n_cells,).
-        law: "linear" for the stiffness at zero strain, "neo_hookean" for the whole energy.
+        law: "linear" for the stiffness at zero strain, "neo_hookean" for the whole energy,
+            "neo_hookean_fibres" with the stretch of a flat tow's fibres in twist.
 
     Raises:
         ValueError: an unknown law, or a section that the Neo-Hookean law does not know.
     """
     mesh = disc.tows.mesh
-    if law == "neo_hookean":
+    if law in ("neo_hookean", "neo_hookean_fibres"):
+        fibres = law == "neo_hookean_fibres"
         rectangles = [s for s in sections if isinstance(s, RectangularSection)]
         if len(rectangles) < len(sections):
             raise ValueError("the Neo-Hookean section law needs rectangular sections")
         d = np.array([[s.compressibility] for s in rectangles])
         if not d.any():
-            return neo_hookean_section()
+            return neo_hookean_section(fibres=fibres)
         space = _dolfinx.constants_per_cell(mesh, 1)
-        return neo_hookean_section(disc.cell_field(space, d[kind]))
+        return neo_hookean_section(disc.cell_field(space, d[kind]), fibres=fibres)
     if law != "linear":
-        raise ValueError(f"unknown section law {law!r}: linear and neo_hookean are known")
+        known = ", ".join(get_args(SectionLawName))
+        raise ValueError(f"unknown section law {law!r}: known are {known}")
     matrices = [s.stiffness() for s in sections]
     if all(C.ndim == 1 for C in matrices):
         return LINEAR
