@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from ..mechanics import shear_laws
+from ..mechanics import compaction, shear_laws
 from .groups import Keys, NotNegative, Positive
 
 __all__ = ["ShearLawKeys"]
@@ -104,12 +104,37 @@ class LockingKeys(Keys):
         return shear_laws.Locking(math.radians(self.angle_deg), self.k_N_mm * area)
 
 
+class CompactionKeys(Keys):
+    """Neighbouring tows of the fabric touch side by side: in shear beyond arccos(width/spacing)."""
+
+    law: Literal["compaction"]
+    width_mm: Positive = Field(description="of the fabric's own tows, not of the virtual ones")
+    spacing_mm: Positive = Field(description="of the fabric's own tows, larger than the width")
+    weft_width_mm: Positive | None = Field(None, description="if it differs from the warp's")
+    weft_spacing_mm: Positive | None = Field(None, description="if it differs from the warp's")
+    stiffness_N_mm2: Positive = Field(
+        description="force per tow length and compression: transverse modulus · height/width"
+    )
+
+    @model_validator(mode="after")
+    def _has_gaps(self) -> CompactionKeys:
+        self.build(1.0)
+        return self
+
+    def build(self, area: float) -> shear_laws.ShearLaw:
+        """The law of a crossing that stands for ``area`` [mm²]."""
+        widths = (self.width_mm, self.weft_width_mm or self.width_mm)
+        spacings = (self.spacing_mm, self.weft_spacing_mm or self.spacing_mm)
+        return compaction.Compaction(widths, spacings, self.stiffness_N_mm2, area)
+
+
 ShearLawKeys = Annotated[
     TabulatedSpringKeys
     | PowerDashpotKeys
     | TabulatedDashpotKeys
     | MaxwellKeys
     | FrictionKeys
-    | LockingKeys,
+    | LockingKeys
+    | CompactionKeys,
     Field(discriminator="law"),
 ]
