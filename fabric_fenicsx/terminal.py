@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -14,7 +14,7 @@ from rich.table import Table
 
 from .rigs.keys import unit
 
-__all__ = ["counting", "following", "summarise"]
+__all__ = ["counting", "following", "searching", "summarise", "summarise_diagnosis"]
 
 COMPILING = "compiling forms, about a minute on a first run"
 
@@ -105,6 +105,51 @@ def counting(what: str, total: int) -> Iterator[Any]:
     ) as bar:
         task = bar.add_task(what, total=total)
         yield lambda done: bar.update(task, completed=done)
+
+
+@contextmanager
+def searching(quiet: bool) -> Iterator[Callable[[float, str], None]]:
+    """A function (share done, what is being done) that shows both on a terminal unless quiet."""
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("{task.description:<45}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        console=console,
+        transient=True,
+        disable=quiet or not console.is_terminal,
+    ) as bar:
+        task = bar.add_task("reading", total=1.0)
+        yield lambda share, what: bar.update(task, completed=share, description=what)
+
+
+def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
+    """Print what a diagnosis found, test by test, and where its page is."""
+    console = Console(highlight=False)
+    for test, part in report.get("tests", {report["test"]: report}).items():
+        console.print(f"{test}: {part['verdict']}", soft_wrap=True)
+        console.print(part["headline"], soft_wrap=True)
+        table = Table("", "parameter", "value", "±", "unit", "rivals")
+        model = part["model"]
+        for effect in [{"name": "baseline", **part["baseline"], "rivals": []}, *part["effects"]]:
+            # The baseline's as they are in the model that is reported.
+            for k, name in enumerate(effect["parameters"]):
+                table.add_row(
+                    "" if k else effect["name"],
+                    name,
+                    _shown(model["parameters"][name]),
+                    _shown(model["std"][name]),
+                    part["parameters"][name]["unit"],
+                    "" if k else ", ".join(effect["rivals"]),
+                )
+        console.print(table)
+        error = part["error"]
+        table = Table(f"error, {error['quantity']}", "before", "after", "noise")
+        for kind, label in (("fit", "fitted"), ("holdout", "held out")):
+            row = [_shown(error[when][kind]) for when in ("before", "after")]
+            table.add_row(label, *row, _shown(error["noise"]))
+        console.print(table)
+    console.print(f"report in {folder / 'report.json'}", soft_wrap=True)
 
 
 def summarise(result: dict[str, Any], folder: Any) -> None:

@@ -11,6 +11,7 @@ import typer
 from .. import __version__
 from .animate import animate
 from .check import check
+from .diagnose import diagnose
 from .doctor import doctor
 from .export import export
 from .fibres import fibres
@@ -57,6 +58,7 @@ EXAMPLES: dict[Callable[..., None], list[str]] = {
     animate: ["animate results/drape", "animate results/drape --out drape.mp4"],
     fibres: ["fibres results/drape", "fibres results/drape --out fibres.vtu"],
     export: ["export results/drape net.vtk"],
+    diagnose: ["diagnose my_fabric", "diagnose frame strip --effects crossover_friction"],
     doctor: ["doctor"],
 }
 

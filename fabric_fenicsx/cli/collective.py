@@ -18,7 +18,7 @@ PATIENCE = 30.0
 """Seconds that a rank with bad input waits for the others to find it bad as well."""
 
 
-def collective(action: Callable[[Any], int], folder: Path) -> int:
+def collective(action: Callable[[Any], int], folder: Path | None = None) -> int:
     """Do on every rank what may fail on any of them; returns the exit code.
 
     Bad input is one line from rank 0. Whatever else goes wrong on one of several ranks ends all of
@@ -26,7 +26,7 @@ def collective(action: Callable[[Any], int], folder: Path) -> int:
 
     Args:
         action: given MPI's world; its exit code is this one's.
-        folder: where accepted steps are, for the line after an interrupt.
+        folder: where accepted steps are, for the line after an interrupt; None: nothing is kept.
     """
     from mpi4py import MPI
 
@@ -39,7 +39,12 @@ def collective(action: Callable[[Any], int], folder: Path) -> int:
         code = 130 if isinstance(error, KeyboardInterrupt) else error.exit_code
         line = " ".join(str(error).split())
         if interrupted:
-            line = f"interrupted: accepted steps are in {folder}, --resume goes on from the last"
+            line = "interrupted: "
+            line += (
+                "nothing has been written"
+                if folder is None
+                else f"accepted steps are in {folder}, --resume goes on from the last"
+            )
         say(line)
         if not _all_come(guard, 2.0 if interrupted else PATIENCE):
             if comm.rank != 0:
@@ -56,16 +61,17 @@ def collective(action: Callable[[Any], int], folder: Path) -> int:
 
 
 def from_root(comm: Any, load: Callable[[], Any]) -> Any:
-    """What rank 0 alone reads, on every rank; its InputError as well. Collective."""
-    value, problem = None, None
+    """What rank 0 alone reads or does, on every rank; its errors as well. Collective."""
+    value: Any = None
+    problem: InputError | SolveError | None = None
     if comm.rank == 0:
         try:
             value = load()
-        except InputError as error:
-            problem = str(error)
+        except (InputError, SolveError) as error:
+            problem = error
     value, problem = comm.bcast((value, problem))
     if problem is not None:
-        raise InputError(problem)
+        raise problem
     return value
 
 

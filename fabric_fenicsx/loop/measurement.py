@@ -223,6 +223,7 @@ def read_measurement(folder: Path) -> Measurement:
     if found:
         more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
         raise InputError(one_line(f"{path}: {found[0][1]}{more}"))
+    _check_noise(path, keys)
     _check_runs(path, keys)
     _check_rig(path, keys)
     runs = tuple(_read_run(folder, keys, entry) for entry in keys.runs)
@@ -236,6 +237,16 @@ def _check_choice(path: Path, data: dict[Any, Any], key: str, allowed: tuple[str
         close = suggestion(value, allowed) if isinstance(value, str) else ""
         shown = f"{plain(value)}{close}" if key in data else "missing"
         raise InputError(one_line(f"{path}: {key}: {shown}, allowed is {one_of(list(allowed))}"))
+
+
+def _check_noise(path: Path, keys: MeasurementKeys) -> None:
+    given = [name for name in NoiseKeys.model_fields if getattr(keys.noise, name) is not None]
+    own = QUANTITY[keys.test]
+    # More than this test's own may be kept in one place for several tests.
+    if given and own not in given:
+        raise InputError(
+            f"{path}: noise.{given[0]}: of another test, allowed is {own} with test: {keys.test}"
+        )
 
 
 def _check_runs(path: Path, keys: MeasurementKeys) -> None:

@@ -1,0 +1,172 @@
+"""The command diagnose: from folders of measured data to a report."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+
+import pytest
+from measurements.bad import CASES, EXECUTED
+from measurements.sets import sixty
+from test_cli import MPI, contents
+
+from fabric_fenicsx.__main__ import main
+from fabric_fenicsx.loop.report import SCHEMA, parameter_unit
+
+RECIPES = {recipe.name: recipe for recipe in sixty(1)}
+#: One set of each verdict, with the effects in it.
+SETS = {
+    "crossover_friction-dahl": ("effect_found", ["crossover_friction"]),
+    "none-shear-declared": ("no_effect", []),
+    "unlisted-vibration": ("unexplained", []),
+}
+
+
+def command(*arguments):
+    """Exit code of the command line."""
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return int(ended.value.code or 0)
+
+
+def report_of(folder):
+    def refuse(word):
+        raise AssertionError(f"{word} is no JSON")
+
+    return json.loads((folder / "report.json").read_text(), parse_constant=refuse)
+
+
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory):
+    """Folders of measurement and of report by name of a set."""
+    made = {}
+    for name in SETS:
+        folder = tmp_path_factory.mktemp("sets") / name
+        RECIPES[name](folder)
+        out = folder.parent / "report"
+        assert command("diagnose", folder, "--out", out, "--quiet") == 0
+        made[name] = folder, out
+    return made
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_report_keeps_the_contract(diagnosed, name):
+    _, out = diagnosed[name]
+    report = report_of(out)
+    verdict, effects = SETS[name]
+    assert report["schema"] == SCHEMA == "fabric-report/1"
+    assert report["test"] == "picture_frame"
+    assert report["verdict"] == verdict
+    assert [effect["name"] for effect in report["effects"]] == effects
+    for effect in report["effects"]:
+        assert effect["parameters"] and set(effect["std"]) == set(effect["parameters"])
+        assert isinstance(effect["rivals"], list)
+    listed = "crossover_friction crossover_relaxation rate_hardening shear_locking"
+    listed += " tension_coupling crosshead_backlash load_drift"
+    assert {c["name"] for c in report["candidates"]} == set(listed.split())
+    for candidate in report["candidates"]:
+        assert {"score", "p_value", "error_fit", "error_holdout"} < set(candidate)
+        assert 0.0 <= candidate["p_value"] <= 1.0
+    assert set(report["baseline"]) == {"parameters", "std"}
+    assert set(report["baseline"]["parameters"]) == {"k1_N", "k3_N", "c1_N_s"}
+    error = report["error"]
+    assert error["quantity"] == "force_N"
+    for number in (*error["before"].values(), *error["after"].values(), error["noise"]):
+        assert math.isfinite(number) and number > 0.0
+    assert set(error["before"]) == set(error["after"]) == {"fit", "holdout"}
+    if verdict == "effect_found":
+        assert error["after"]["holdout"] < 0.5 * error["before"]["holdout"]
+    else:
+        assert error["after"] == error["before"]
+    assert not (out / "report.json.partial").exists()
+
+
+def test_the_unexplained_says_what_came_nearest(diagnosed):
+    report = report_of(diagnosed["unlisted-vibration"][1])
+    assert report["best"]["effects"] and report["best"]["effects"][0]["name"] in report["headline"]
+    assert report["best"]["error_fit"] > 1.5 * report["error"]["noise"]
+
+
+def test_the_same_data_give_the_same_report(diagnosed, tmp_path):
+    folder, out = diagnosed["crossover_friction-dahl"]
+    assert command("diagnose", folder, "--out", tmp_path, "--quiet") == 0
+    assert (tmp_path / "report.json").read_bytes() == (out / "report.json").read_bytes()
+
+
+def test_effects_narrows_the_search(diagnosed, tmp_path, capsys):
+    folder, _ = diagnosed["crossover_friction-dahl"]
+    names = ["crossover_friction", "load_drift"]
+    assert command("diagnose", folder, "--out", tmp_path, "--effects", ", ".join(names)) == 0
+    report = report_of(tmp_path)
+    assert [candidate["name"] for candidate in report["candidates"]] == names
+    printed = capsys.readouterr().out
+    assert "effect_found" in printed and "m_c_N" in printed
+    kept = contents(tmp_path)
+    assert command("diagnose", folder, "--out", tmp_path, "--effects", "crossover_fricton") == 2
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert "'crossover_fricton'" in line and all(name in line for name in names)
+    assert contents(tmp_path) == kept
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_a_bad_folder_is_one_line_and_writes_nothing(case, tmp_path, capfd):
+    folder, out = tmp_path / "measured", tmp_path / "report"
+    case.write(folder)
+    assert command("diagnose", folder, "--out", out) == 2
+    printed = capfd.readouterr()
+    assert printed.err.count("\n") == 1 and printed.out == ""
+    for text in case.says:
+        assert text in printed.err
+    assert not out.exists() and not (folder / EXECUTED).exists()
+
+
+def test_the_same_folder_twice_is_a_mistake(diagnosed, tmp_path, capsys):
+    folder, _ = diagnosed["none-shear-declared"]
+    twice = ["diagnose", folder, folder.parent / "report" / ".." / folder.name]
+    assert command(*twice, "--out", tmp_path / "new") == 2
+    assert "stands twice" in capsys.readouterr().err
+
+
+def test_a_baseline_without_enough_readings_is_exit_code_3(diagnosed, tmp_path, capsys):
+    """Four readings, two of which lie beside corners of unknown sharpness, leave no fit."""
+    folder = tmp_path / "short"
+    RECIPES["none-shear-declared"](folder)
+    rows = ["time_s,displacement_mm,force_N", "0,0,0", "1,9,0.3", "2,5,0.1", "3,14,0.5"]
+    for path in folder.glob("*.csv"):
+        path.write_text("\n".join(rows) + "\n")
+    assert command("diagnose", folder, "--out", tmp_path / "new") == 3
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1 and "baseline" in line
+    assert not list((tmp_path / "new").iterdir())
+
+
+def test_units_are_those_of_the_names():
+    units = {"k1_N": "N", "c1_N_s": "N s", "drift_N_s": "N/s", "rounding_rad_s": "rad/s", "n": ""}
+    units |= {"slip_angle_rad": "rad", "free_travel_mm": "mm", "force_N": "N", "angle_deg": "°"}
+    assert {name: parameter_unit(name) for name in units} == units
+
+
+@pytest.mark.mpi
+def test_two_ranks_report_the_same(diagnosed, tmp_path):
+    folder, out = diagnosed["crossover_friction-dahl"]
+    env = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    program = ["/usr/bin/mpirun", "-n", "2", sys.executable, "-m", "fabric_fenicsx", "diagnose"]
+
+    def on_two_ranks(*arguments):
+        return subprocess.run(
+            [*program, *map(str, arguments)],
+            env=env | MPI,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=120,
+        )
+
+    process = on_two_ranks(folder, "--out", tmp_path / "two")
+    assert process.returncode == 0, process.stderr
+    assert (tmp_path / "two/report.json").read_bytes() == (out / "report.json").read_bytes()
+    assert process.stdout.count(b"effect_found") == 1
+    process = on_two_ranks(tmp_path, "--out", tmp_path / "bad")
+    assert process.returncode == 2
+    assert process.stderr.count(b"measurement.yaml") == 1
