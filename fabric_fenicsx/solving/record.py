@@ -28,6 +28,7 @@ from ..output.snapshot import Snapshot
 from ..output.surfaces import tool_surface
 from .balance import Balance
 from .model import Model
+from .predictor import DEPTH
 from .stepping import Step, Stepper
 
 __all__ = ["Record", "load_state", "prepare_folder", "write_result"]
@@ -35,10 +36,13 @@ __all__ = ["Record", "load_state", "prepare_folder", "write_result"]
 PLATE_EXTENT = 1.24
 """How far out die and holder are drawn, over the farthest node of the flat sheet."""
 
-STEP_SCHEMA = "fabric-step/1"
+STEP_SCHEMA = "fabric-step/2"
 
-STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6}
+STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6 * DEPTH}
 """What a step file has for each node, and how many numbers of it."""
+
+NUMBERS = ("time", "number", "previous_steps", "predictor_order", "next_step")
+"""What it has beside."""
 
 _CLAIMED: dict[Path, int] = {}
 """Folders that this process has locked, and the handles that hold the locks."""
@@ -163,7 +167,7 @@ class Record:
 
     def keep(self, step: Step, stepper: Stepper) -> None:
         """Write the accepted state."""
-        disc, state = self.model.disc, stepper.state
+        disc, state, predictor = self.model.disc, stepper.state, stepper.predictor
         n = disc.owned
         arrays = {
             "u": disc.tows.u_n.x.array.reshape(-1, 3),
@@ -171,7 +175,7 @@ class Record:
             "v": state.v,
             "vdot": state.vdot,
             "a": state.a,
-            "previous": state.previous,
+            "previous": np.hstack(list(predictor.past)),
         }
         whole = {name: disc.gather_nodes(values[:n]) for name, values in arrays.items()}
         histories = self.model.histories.save()
@@ -183,7 +187,8 @@ class Record:
                         schema=STEP_SCHEMA,
                         time=step.time,
                         number=step.number,
-                        previous_step=state.previous_step,
+                        previous_steps=predictor.lengths,
+                        predictor_order=predictor.order,
                         next_step=state.next_step,
                         **whole,
                         **{f"history: {k}": v for k, v in histories.items()},
@@ -212,7 +217,7 @@ def load_state(path: Path, stepper: Stepper) -> None:
         schema = str(data.get("schema", STEP_SCHEMA))  # the first files did not say
         if schema != STEP_SCHEMA:
             raise ValueError(f"schema {schema}, this version reads {STEP_SCHEMA}")
-        missing = {*STATE, "time", "number", "previous_step", "next_step"} - set(data)
+        missing = {*STATE, *NUMBERS} - set(data)
         if missing:
             raise KeyError(f"{', '.join(sorted(missing))} missing")
     except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
@@ -234,9 +239,10 @@ def load_state(path: Path, stepper: Stepper) -> None:
         disc.connectors.u_n.x.array[:] = data["u"][disc.connector_nodes].ravel()
         disc.connectors.q_n.x.array[:] = data["q"][disc.connector_nodes].ravel()
     state.v, state.vdot, state.a = local("v"), local("vdot"), local("a")
-    state.previous = local("previous")
+    stepper.predictor.past = np.stack(np.hsplit(local("previous"), DEPTH))
+    stepper.predictor.lengths = data["previous_steps"]
+    stepper.predictor.order = int(data["predictor_order"])
     state.time = float(data["time"])
-    state.previous_step = float(data["previous_step"])
     state.next_step = float(data["next_step"])
     stepper.number = int(data["number"])
     prefix = "history: "

@@ -103,8 +103,8 @@ def simulate(
     try:
         for stop_at in (*sorted(stops), end):
             stepper.run(stop_at)
-            # Beyond a corner of the motion the last step is no guide.
-            stepper.state.previous[:] = 0.0
+            # Beyond a corner of the motion the last steps are no guide.
+            stepper.predictor.forget()
     except SolveError as error:
         stop = str(error)
     seconds = {

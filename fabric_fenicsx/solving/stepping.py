@@ -15,6 +15,7 @@ import numpy.typing as npt
 from ..errors import SolveError
 from .generalised_alpha import GeneralisedAlpha
 from .newton import Newton, Outcome
+from .predictor import Predictor
 from .update import advance_fields
 
 if TYPE_CHECKING:
@@ -34,8 +35,6 @@ class State:
         v: velocity [mm/s] and material angular velocity [rad/s], (n, 6).
         vdot: their rates, (n, 6).
         a: the method's auxiliary accelerations, (n, 6).
-        previous: the last accepted increment, for the predictor, (n, 6).
-        previous_step: its step length [s]; 0 before the first.
         next_step: what the step control proposes [s]; 0 before the first.
     """
 
@@ -43,8 +42,6 @@ class State:
     v: Array
     vdot: Array
     a: Array
-    previous: Array
-    previous_step: float = 0.0
     next_step: float = 0.0
 
 
@@ -123,6 +120,7 @@ class Stepper:
         self.alpha = model.alpha
         self.net = model.disc
         self.state = _at_rest(len(self.net.local_nodes))
+        self.predictor = Predictor(len(self.net.local_nodes), self.net.owned, self.net.comm)
         self.number = 0
         self.failures = 0
         self.wasted_iterations = 0
@@ -214,9 +212,7 @@ class Stepper:
             v_star, a_star, _ = self._known_rates(self.alpha, h)
             net.tows.rate_star.x.array[:] = v_star.ravel()
             net.tows.acceleration_star.x.array[:] = a_star.ravel()
-        # The guess goes on as the last step went.
-        ratio = h / state.previous_step if state.previous_step else 0.0
-        self.newton.x.array[:] = ratio * state.previous[: net.owned].ravel()
+        self.newton.x.array[:] = self.predictor.guess(h)[: net.owned].ravel()
         return self.newton.solve(model.targets(state.time, state.time + h))
 
     def advance(self, h: float) -> None:
@@ -228,8 +224,7 @@ class Stepper:
             v_star, a_star, drift = self._known_rates(self.alpha, h)
             a = (w - drift) / (self.alpha.beta * h**2)
             state.v, state.vdot, state.a = c_1 * w + v_star, c_0 * w + a_star, a
-        state.previous = w.copy()
-        state.previous_step = h
+        self.predictor.learn(h, w)
         state.time += h
         self.net.everywhere(advance_fields)
 
@@ -244,5 +239,5 @@ class Stepper:
 
 
 def _at_rest(blocks: int) -> State:
-    v, vdot, a, previous = (np.zeros((blocks, 6)) for _ in range(4))
-    return State(0.0, v, vdot, a, previous)
+    v, vdot, a = (np.zeros((blocks, 6)) for _ in range(3))
+    return State(0.0, v, vdot, a)
