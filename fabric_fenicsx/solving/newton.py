@@ -23,9 +23,12 @@ from .system import System
 
 __all__ = ["Newton", "Outcome"]
 
-#: A residual this many times the first one, after three iterations, will not come back: early in a
-#: step stiff tows make it rise by orders, so that growth alone is no sign.
+#: A residual this many times that of the guess and of the first iterate, after three iterations, will
+#: not come back: early in a step stiff tows make it rise by orders, so that growth alone is no sign.
 RUNAWAY = 1e2
+
+#: Iterations within which the smallest residual must have halved, or the step has failed.
+PATIENCE = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +248,10 @@ class Newton:
             return int(reasons.DIVERGED_FNORM_NAN)
         if iteration > 0 and residual < self.force_tolerance:
             return int(reasons.CONVERGED_FNORM_ABS)
-        if iteration > 3 and residual > RUNAWAY * self._history[0]:
+        history = self._history
+        if iteration > 3 and residual > RUNAWAY * max(history[:2]):
+            return int(reasons.DIVERGED_DTOL)
+        if iteration > PATIENCE and min(history[-PATIENCE:]) > min(history[1:-PATIENCE]) / 2.0:
             return int(reasons.DIVERGED_DTOL)
         if iteration >= self.limit:
             return int(reasons.DIVERGED_MAX_IT)
