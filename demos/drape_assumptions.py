@@ -50,7 +50,7 @@ VARIATIONS: dict[str, list[str]] = {
     "contact twice as stiff": ["contact.stiffness_N_mm2=1"],
     "contact layer 0.25 mm": ["contact.layer_mm=0.25"],
     "four cells per spacing": ["sheet.subdivisions=4"],
-    "steps of at most 1.5 s": ["solver.largest_step_s=1.5"],
+    "steps of at most 0.25 s": ["solver.largest_step_s=0.25"],
 }
 OUTWARD = {"points 6 mm inward": -6.0, "points 6 mm outward": 6.0}
 

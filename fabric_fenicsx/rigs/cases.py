@@ -120,7 +120,7 @@ class SolverKeys(Keys):
 
     first_step_s: Positive = Field(0.1, description="first time step")
     smallest_step_s: Positive = Field(1e-4, description="the run stops below this step")
-    largest_step_s: Positive = Field(3.0, description="steps never grow above this")
+    largest_step_s: Positive = Field(1.0, description="steps never grow above this")
     force_tolerance_N: Positive = Field(1e-4, description="norm of the residual in balance")
     iteration_limit: Annotated[int, Field(ge=3, le=200)] = Field(
         15, description="Newton iterations after which a step has failed"

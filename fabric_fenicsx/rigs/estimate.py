@@ -9,14 +9,14 @@ from .cases import CantileverCase, Case, DrapeCase, PictureFrameCase
 
 __all__ = ["Estimate", "estimate"]
 
-# The demos on one core of a 2.5 GHz server: drapes of 3600, 7056 and 14112 dofs took 55, 51 and 67
-# steps of up to 3 s, 396, 324 and 471 iterations and 12, 27 and 50 s; the picture frame, 3168 dofs,
-# took 68 steps of up to 8 s, 118 iterations and 5 s; the cantilevers 60 steps and 192 iterations.
-STEPS = {"drape": 2.8, "picture_frame": 1.1, "cantilever": 1.0}
+# The demos on one core of a 2.5 GHz server: drapes of 3600 and 14112 dofs took 73 and 78 steps of
+# up to 1 s, 283 and 347 iterations and 8 and 24 s; the picture frame, 3168 dofs, took 68 steps of
+# up to 8 s, 94 iterations and 4 s; the cantilevers 60 steps, 152 iterations and 4 s.
+STEPS = {"drape": 1.25, "picture_frame": 1.1, "cantilever": 1.0}
 """Steps over those that would do if every step were the largest allowed."""
-ITERATIONS = {"drape": 7.0, "picture_frame": 1.8, "cantilever": 3.2}
+ITERATIONS = {"drape": 4.0, "picture_frame": 1.4, "cantilever": 2.5}
 """Of Newton, for each step."""
-SECONDS = 1.0e-5
+SECONDS = 5.0e-6
 """For each iteration and dof, on one core."""
 OVERHEAD = 3.0
 """Start, mesh and pictures [s]."""

@@ -23,8 +23,8 @@ from .system import System
 
 __all__ = ["Newton", "Outcome"]
 
-#: A residual this many times that of the guess and of the first iterate, after three iterations, will
-#: not come back: early in a step stiff tows make it rise by orders, so that growth alone is no sign.
+#: A residual this many times that of the guess and of the first iterate, after three iterations,
+#: will not come back: early in a step stiff tows make it rise by orders, growth alone is no sign.
 RUNAWAY = 1e2
 
 #: Iterations within which the smallest residual must have halved, or the step has failed.
@@ -109,8 +109,8 @@ class Newton:
             "snes_divergence_tolerance": -1,
             "ksp_type": "preonly",
             "pc_factor_mat_solver_type": "mumps",
-            # Orderings found best on these nets: AMD on one rank, AMF on several.
-            "mat_mumps_icntl_7": 0 if net.comm.size == 1 else 2,
+            # Orderings found best on these nets: METIS on one rank, AMF on several.
+            "mat_mumps_icntl_7": 5 if net.comm.size == 1 else 2,
             "mat_mumps_icntl_14": 50,
         }.items():
             if not options.hasName(prefix + key):
