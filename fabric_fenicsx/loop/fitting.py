@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -47,6 +47,8 @@ class Fit:
         expected: the model there, (n,).
         used: readings that were fitted, (n,).
         weight: of the readings, (n,).
+        leverage: variance of the expected reading that the parameters' errors make, for a noise
+            of one unit, (n,).
     """
 
     variants: tuple[Variant, ...]
@@ -58,6 +60,7 @@ class Fit:
     expected: Array
     used: npt.NDArray[np.bool_]
     weight: Array
+    leverage: Array
 
     @property
     def sum_of_squares(self) -> float:
@@ -92,6 +95,7 @@ def fit(
     used: npt.NDArray[np.bool_],
     *,
     evaluations: int = 60,
+    robust: float | None = None,
 ) -> Fit:
     """Fit a model to some readings.
 
@@ -101,6 +105,7 @@ def fit(
         start: of every parameter.
         used: the readings to fit, (n,).
         evaluations: of the model at most.
+        robust: a residual beyond which readings count less and less; None for least squares.
 
     Raises:
         SolveError: the model has no solution at the start.
@@ -144,10 +149,15 @@ def fit(
         ftol=1e-10,
         gtol=1e-12,
         max_nfev=evaluations,
+        loss="linear" if robust is None else "soft_l1",
+        f_scale=robust or 1.0,
     )
     expected, _ = model(result.x)
     J = jacobian(result.x)
-    std, correlation = _uncertainty(J)
+    if not np.isfinite(J).all():
+        raise SolveError(f"a derivative in {', '.join(names)} is not finite at the fit")
+    std, correlation, covariance = _uncertainty(J)
+    every = np.column_stack([model(result.x)[1][name] * readings.weight for name in names])
     near = np.triu(np.abs(correlation) > CORRELATED, 1)
     return Fit(
         variants=tuple(variants),
@@ -159,6 +169,23 @@ def fit(
         expected=expected,
         used=used,
         weight=readings.weight,
+        leverage=np.einsum("ij,jk,ik->i", every, covariance, every),
+    )
+
+
+def without(experiment: Experiment, model: Fit, variants: Sequence[Variant]) -> Fit:
+    """A fitted model with some effects taken out and its other parameters left as they are."""
+    kept = tuple(v for v in model.variants if v not in variants)
+    names = [p.name for p in parameters_of(experiment, kept)]
+    values = {name: model.values[name] for name in names}
+    expected, _ = experiment.predict(kept, values)
+    return replace(
+        model,
+        variants=kept,
+        values=values,
+        std={name: model.std[name] for name in names},
+        residual=experiment.readings.observed - expected,
+        expected=expected,
     )
 
 
@@ -277,14 +304,17 @@ def _least(p: Parameter, value: float) -> float:
     return 1e-3 * abs(value) + SMALL if p.one_sided else value
 
 
-def _uncertainty(J: Array) -> tuple[Array, Array]:
-    """Standard errors for unit noise, infinite where nothing depends on it, and correlations."""
+def _uncertainty(J: Array) -> tuple[Array, Array, Array]:
+    """For unit noise: standard errors, infinite where nothing depends on it; correlations;
+    covariance.
+    """
     scale = np.linalg.norm(J, axis=0)
     dead = scale == 0.0
     safe = np.where(dead, 1.0, scale)
     information = (J / safe).T @ (J / safe)
     information[dead, dead] = 1.0
-    covariance = np.linalg.pinv(information, rcond=1e-14, hermitian=True)
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    correlation = covariance / np.maximum(np.outer(std, std), 1e-300)
-    return np.where(dead, np.inf, std / safe), correlation
+    scaled = np.linalg.pinv(information, rcond=1e-14, hermitian=True)
+    std = np.sqrt(np.maximum(np.diag(scaled), 0.0))
+    correlation = scaled / np.maximum(np.outer(std, std), 1e-300)
+    covariance = np.where(np.outer(dead, dead), 0.0, scaled / np.outer(safe, safe))
+    return np.where(dead, np.inf, std / safe), correlation, covariance

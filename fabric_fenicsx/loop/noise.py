@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from .experiment import Readings
 
-__all__ = ["Whiteness", "estimated_noise", "spikes", "whiteness"]
+__all__ = ["Whiteness", "estimated_noise", "lone", "spikes", "whiteness"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -20,6 +20,8 @@ Flags = npt.NDArray[np.bool_]
 SPIKE = 6.0
 #: ... and times the steps of the readings on both sides of them.
 PEAK = 3.0
+#: Sigmas, from the median, by which a model misses a lone reading; and the share of such readings.
+LONE, MOST_LONE = 7.0, 0.03
 #: Below this a test says that something is left in the residual.
 LIMIT = 1e-3
 
@@ -88,6 +90,25 @@ def spikes(residual: Array, readings: Readings, rows: Flags) -> Flags:
             if alone[k] * agree[k] <= SPIKE * np.sqrt(1.5) * sigma:
                 break
             found[own[k + 1]] = True
+    return found
+
+
+def lone(residual: Array, readings: Readings, rows: Flags) -> Flags:
+    """Readings that a model misses by far while it meets their neighbours and all but a few, (n,).
+
+    None where there are more than a few of them: then it is the model that is wrong.
+    """
+    z = np.abs(residual * readings.weight)
+    scale = 1.4826 * float(np.median(z[rows])) if rows.any() else 0.0
+    far = rows & (z > LONE * scale)
+    beside = np.zeros_like(far)
+    own = np.flatnonzero(rows)
+    together = np.diff(readings.run[own]) == 0
+    beside[own[1:]] |= far[own[:-1]] & together
+    beside[own[:-1]] |= far[own[1:]] & together
+    found = far & ~beside
+    if found.sum() < far.sum() or found.sum() > max(2, MOST_LONE * rows.sum()):
+        return np.zeros_like(far)
     return found
 
 

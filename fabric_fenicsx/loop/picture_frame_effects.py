@@ -148,6 +148,16 @@ PICTURE_FRAME_EFFECTS = (
                 laws=lambda p: (Maxwell(p["k_maxwell_N"], p["relaxation_time_s"]),),
             ),
             FrameVariant(
+                "one branch, cubic",
+                (
+                    *_branch("", (0.01, 0.03, 0.1, 0.3)),
+                    Parameter("cubic_1_rad2", (1.0, 3.0), 0.0, 50.0, meaning="of its spring"),
+                ),
+                laws=lambda p: (
+                    Maxwell(p["k_maxwell_N"], p["relaxation_time_s"], p["cubic_1_rad2"]),
+                ),
+            ),
+            FrameVariant(
                 "two branches",
                 (*_branch("", (0.1, 0.4)), *_branch("2", (0.01, 0.04))),
                 laws=lambda p: (

@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline
 
 __all__ = ["Programme", "programme"]
 
@@ -24,6 +25,8 @@ LEAST_JUMP = 0.05
 JUMP_RATIO = 4.0
 #: Share of the largest speed by which two estimates of a rate may differ.
 DOUBT = 0.02
+#: Points put between two readings where the speed changes much.
+BETWEEN = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +83,9 @@ def programme(time: Array, displacement: Array) -> Programme:
             # Reached along the piece before it.
             value = displacement[k - 1] + rate[k - 1] * (corner - time[k - 1])
             added.append((corner, float(value), float(rate[k - 1])))
+    # Slow and not at rest: which way it goes is not known.
+    certain &= (rate == 0.0) | (np.abs(rate) > DOUBT * top)
+    added += _between(time, displacement, rate, corners, top)
     points = [
         (t, d, v, i) for i, (t, d, v) in enumerate(zip(time, displacement, rate, strict=True))
     ]
@@ -95,6 +101,27 @@ def programme(time: Array, displacement: Array) -> Programme:
     return Programme(
         columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3].astype(np.int64), certain
     )
+
+
+def _between(
+    time: Array, displacement: Array, rate: Array, corners: list[float], top: float
+) -> list[tuple[float, float, float]]:
+    """Points between readings where the speed changes much: a turn there would go unseen.
+
+    From the cubic with the values and rates of both readings (Hermite).
+    """
+    added = []
+    share = np.arange(1, BETWEEN + 1) / (BETWEEN + 1)
+    for i in np.flatnonzero(np.abs(np.diff(rate)) > LEAST_JUMP * top):
+        start, step = time[i], time[i + 1] - time[i]
+        if any(start <= corner <= start + step for corner in corners):
+            continue
+        piece = CubicHermiteSpline(
+            [0.0, step], displacement[i : i + 2], rate[i : i + 2], extrapolate=False
+        )
+        for s in share * step:
+            added.append((float(start + s), float(piece(s)), float(piece(s, 1))))
+    return added
 
 
 def _resolution(values: Array) -> float:

@@ -22,13 +22,14 @@ from scipy.stats import chi2
 from ..errors import SolveError
 from .effects import Effect, Variant
 from .experiment import Experiment
-from .fitting import Fit, fit, fit_from_grid, orthogonal_to, signatures
-from .noise import Whiteness, estimated_noise, spikes, whiteness
+from .fitting import Fit, fit, fit_from_grid, orthogonal_to, signatures, without
+from .noise import Whiteness, estimated_noise, lone, spikes, whiteness
 
 __all__ = ["Candidate", "Diagnosis", "diagnose_test"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+Model = tuple[Fit, tuple[Effect, ...]]
 Verdict = Literal["no_effect", "effect_found", "unexplained"]
 
 #: Probability of a score by chance, over all candidates together, below which it is followed.
@@ -132,51 +133,66 @@ class _Search:
         self.readings = experiment.readings
         self.tried = [e for e in experiment.effects if names is None or e.name in names]
         start = {p.name: p.starts[0] for p in experiment.baseline}
-        rows = self.readings.fit
-        first = fit(experiment, (), start, rows)
-        self.outliers = spikes(first.residual, self.readings, self.readings.usable)
-        if self.outliers.any():
-            first = fit(experiment, (), first.values, rows & ~self.outliers)
-        self.rows = first.used
-        if self.rows.sum() <= len(first.values):
+        self.outliers = np.zeros(len(self.readings.observed), dtype=bool)
+        self.baseline = fit(experiment, (), start, self.readings.fit)
+        self._validated: dict[int, float] = {}
+        # Their ids stay theirs as long as they live.
+        self._kept: list[Fit] = []
+        self.given = experiment.noise is not None
+        self.noise = experiment.noise or self._noise_of(self.baseline)
+        self._leave_out(self.baseline)
+        self.noise = experiment.noise or self._noise_of(self.baseline)
+
+    @property
+    def rows(self) -> Flags:
+        """Readings that are fitted."""
+        return np.asarray(self.readings.fit & ~self.outliers)
+
+    def _leave_out(self, model: Fit) -> bool:
+        """Leave out what stands out from a model's residual; whether that was anything new."""
+        rows = self.readings.usable & ~self.outliers
+        try:
+            # What is far off must not pull the model towards itself.
+            start, limit = model.values, 3.0 * self.noise
+            model = fit(self.experiment, model.variants, start, self.rows, robust=limit)
+        except SolveError:
+            pass
+        found = spikes(model.residual, self.readings, rows)
+        found |= lone(model.residual, self.readings, rows & ~found)
+        if found.any():
+            self.outliers = self.outliers | found
+            self.baseline = fit(self.experiment, (), self.baseline.values, self.rows)
+        if self.rows.sum() <= len(self.baseline.values):
             raise SolveError(
-                f"the baseline has {len(first.values)} parameters "
+                f"the baseline has {len(self.baseline.values)} parameters "
                 f"and there are {int(self.rows.sum())} readings to fit"
             )
-        self.baseline = first
-        self.given = experiment.noise is not None
-        self.noise = experiment.noise or estimated_noise(first.residual, self.readings, self.rows)
+        return bool(found.any())
 
     def run(self) -> Diagnosis:
         """See diagnose_test."""
-        baseline = self.baseline
-        candidates = self._scores()
-        for k, candidate in enumerate(candidates):
-            self.progress(0.1 + 0.5 * k / len(candidates), f"fit {candidate.effect.name}")
-            candidate.fit = self._best_variant(baseline, candidate.effect)
-        singles = [c for c in candidates if c.fit is not None]
-        singles.sort(key=lambda c: self._criterion(c.fit))
+        candidates, singles = self._tried()
+        if singles and self._leave_out(singles[0].fit or self.baseline):
+            # A spike is seen better once the large part of the residual is gone.
+            candidates, singles = self._tried()
         if not self.given and singles:
-            self.noise = self._noise_of(singles[0].fit or baseline)
-        before = self._whiteness(baseline)
-        chosen: Fit = baseline
-        effects: tuple[Effect, ...] = ()
-        explained = self._explains(baseline)
-        alarm = any(c.p_value < ALARM for c in candidates)
-        best: Fit | None = None
-        if alarm or not explained:
-            chosen, effects, explained = self._choose(singles)
-            best = chosen
+            self.noise = self._noise_of(singles[0].fit or self.baseline)
+        nearest: Model = (self.baseline, ())
+        explained = self._explains(self.baseline)
+        quiet = explained and all(c.p_value >= ALARM for c in candidates)
+        if not quiet:
+            nearest, explained = self._choose(singles)
+            if not explained and self._leave_out(nearest[0]):
+                candidates, singles = self._tried()
+                nearest, explained = self._choose(singles)
         for candidate in candidates:
             if candidate.fit is not None:
                 candidate.holdout = self._holdout(candidate.fit)
-        verdict: Verdict = "no_effect"
-        if best is not None:
-            verdict = "effect_found" if explained and effects else "unexplained"
-            if not effects and explained:
-                verdict = "no_effect"
-        if verdict != "effect_found":
-            chosen, effects = baseline, ()
+        baseline = self.baseline
+        verdict: Verdict = "effect_found" if explained else "unexplained"
+        if quiet:
+            verdict = "no_effect"
+        chosen, effects = nearest if verdict == "effect_found" else (baseline, ())
         self.progress(0.95, "rivals")
         return Diagnosis(
             experiment=self.experiment,
@@ -187,17 +203,27 @@ class _Search:
             else "estimated from how neighbouring readings differ",
             baseline=baseline,
             final=chosen,
-            best=best if best is not chosen else None,
+            best=nearest[0] if verdict == "unexplained" else None,
             effects=effects,
             rivals=self._rivals(chosen, effects, singles),
             candidates=candidates,
             holdout_before=self._holdout(baseline),
             holdout_after=self._holdout(chosen),
             holdout_source=self._source(),
-            white_before=before,
+            white_before=self._whiteness(baseline),
             white_after=self._whiteness(chosen),
             outliers=self.outliers,
         )
+
+    def _tried(self) -> tuple[list[Candidate], list[Candidate]]:
+        """Every effect by itself; then those that have a solution, the best first."""
+        candidates = self._scores()
+        for k, candidate in enumerate(candidates):
+            self.progress(0.1 + 0.5 * k / len(candidates), f"fit {candidate.effect.name}")
+            candidate.fit = self._best_variant(self.baseline, candidate.effect)
+        singles = [c for c in candidates if c.fit is not None]
+        singles.sort(key=lambda c: self._criterion(c.fit))
+        return candidates, singles
 
     # Scores -------------------------------------------------------------------------------
 
@@ -258,39 +284,59 @@ class _Search:
         fits = fit_from_grid(self.experiment, base, effect.variants, starts=starts)
         return min(fits, key=self._criterion, default=None)
 
-    def _choose(self, singles: list[Candidate]) -> tuple[Fit, tuple[Effect, ...], bool]:
-        """The best model of one effect, or of two where one does not explain the data."""
-        if not singles:
-            return self.baseline, (), False
-        first = singles[0]
-        assert first.fit is not None
-        single = (first.fit, (first.effect,))
+    def _choose(self, singles: list[Candidate]) -> tuple[Model, bool]:
+        """The best model of one effect, or of two where one does not explain the data.
+
+        Returns:
+            The model that explains the data, or comes nearest, and whether it explains them.
+        """
+        ones: list[Model] = [(c.fit, (c.effect,)) for c in singles if c.fit is not None]
+        if not ones:
+            return (self.baseline, ()), False
+        single, explained = self._first_that_explains(ones)
         # Only where the residual still shows structure is a second effect looked for.
-        explained = self._explains(first.fit)
-        if explained and not self._whiteness(first.fit).structured:
-            return (*single, True)
+        if explained and not self._whiteness(single[0]).structured:
+            return single, True
         pairs = self._pairs(singles)
         if not pairs:
-            return (*single, explained)
-        best, effects = min(pairs, key=lambda pair: self._criterion(pair[0]))
-        gain = self._criterion(first.fit) - self._criterion(best)
+            return single, explained
+        pair, both_explain = self._first_that_explains(pairs)
+        gain = self._criterion(single[0]) - self._criterion(pair[0])
         if not explained:
-            return (best, effects, True) if self._explains(best) else (*single, False)
-        better = self._holdout(best) < 0.97 * self._holdout(first.fit)
-        if gain > DECISIVE and better and self._explains(best):
-            return best, effects, True
-        return (*single, True)
+            nearest = pair if gain > DECISIVE else single
+            return (pair, True) if both_explain else (nearest, False)
+        better = self._cross_validated(pair[0]) < 0.97 * self._cross_validated(single[0])
+        return (pair, True) if gain > DECISIVE and better and both_explain else (single, True)
 
-    def _pairs(self, singles: list[Candidate]) -> list[tuple[Fit, tuple[Effect, ...]]]:
+    def _first_that_explains(self, models: list[Model]) -> tuple[Model, bool]:
+        """Of those that fit all but equally well, the best in cross-validation that explains."""
+        best = min(self._criterion(model) for model, _ in models)
+        near = [m for m in models if self._criterion(m[0]) < best + DECISIVE]
+        if len(near) > 1:
+            near.sort(key=lambda m: self._cross_validated(m[0]))
+        for model in near:
+            if self._explains(model[0]):
+                return model, True
+        return near[0], False
+
+    def _pairs(self, singles: list[Candidate]) -> list[Model]:
         """The first few effects with each of the others, the stronger first."""
-        found: list[tuple[Fit, tuple[Effect, ...]]] = []
+        found: list[Model] = []
         pairs = [(a, b) for a, b in combinations(singles, MOST) if singles.index(a) < FIRST]
         for k, (a, b) in enumerate(pairs):
             self.progress(0.6 + 0.3 * k / len(pairs), f"fit {a.effect.name}, {b.effect.name}")
-            assert a.fit is not None
-            both = self._best_variant(a.fit, b.effect, starts=1)
+            if a.fit is None:
+                continue
+            both = self._best_variant(a.fit, b.effect)
             if both is not None:
                 found.append((both, (a.effect, b.effect)))
+        # The form of the first was chosen without the second: now with it.
+        found.sort(key=lambda pair: self._criterion(pair[0]))
+        for k, (both, effects) in enumerate(found[:FIRST]):
+            rest = without(self.experiment, both, effects[0].variants)
+            again = self._best_variant(rest, effects[0])
+            if again is not None and self._criterion(again) < self._criterion(both):
+                found[k] = (again, effects)
         return found
 
     # Judgement ----------------------------------------------------------------------------
@@ -314,7 +360,10 @@ class _Search:
             return False
         out = self._held_rows()
         if out.any():
-            return bool(self._holdout(model) / self.noise <= max(NEAR, _upper(int(out.sum()))))
+            # A prediction is as uncertain as the parameters it is made with.
+            doubt = float(np.sqrt(1.0 + np.mean(model.leverage[out])))
+            limit = max(NEAR, _upper(int(out.sum()))) * doubt
+            return bool(self._holdout(model) / self.noise <= limit)
         return count > len(model.values)
 
     def _held_rows(self) -> Flags:
@@ -348,8 +397,13 @@ class _Search:
     def _holdout(self, model: Fit) -> float:
         """Held-out error: of the holdout runs, or of each part predicted from the others."""
         out = self._held_rows()
-        if out.any():
-            return model.rms(out)
+        return model.rms(out) if out.any() else self._cross_validated(model)
+
+    def _cross_validated(self, model: Fit) -> float:
+        """Error of each part of the fitted readings, predicted from the others."""
+        key = id(model)
+        if key in self._validated:
+            return self._validated[key]
         total, count = 0.0, 0
         for part in self._parts():
             rest = self.rows & ~part
@@ -361,7 +415,9 @@ class _Search:
                 continue
             total += float(np.sum((again.residual * again.weight)[part] ** 2))
             count += int(part.sum())
-        return float(np.sqrt(total / count)) if count else float("nan")
+        self._validated[key] = float(np.sqrt(total / count)) if count else float("nan")
+        self._kept.append(model)
+        return self._validated[key]
 
     def _rivals(
         self, chosen: Fit, effects: tuple[Effect, ...], singles: list[Candidate]

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any, Protocol
 
 from scipy.interpolate import PchipInterpolator
-from ufl import conditional, exp, ge, lt, max_value, min_value, sqrt
+from ufl import conditional, exp, ge, lt, max_value, min_value, tanh
 
 __all__ = [
     "CoulombFriction",
@@ -202,15 +202,17 @@ class TabulatedDashpot:
 
 @dataclass(frozen=True, slots=True)
 class Maxwell:
-    """A spring and a dashpot in series: M = k α, α̇ = γ̇ − α/τ. The moment decays in a hold.
+    """A spring and a dashpot in series: M = k α, α̇ = (γ + c γ³)˙ − α/τ. It decays in a hold.
 
     Attributes:
         stiffness: k [N mm].
         relaxation_time: τ [s].
+        cubic: c [1/rad²], which stiffens the spring; 0 for the usual linear one.
     """
 
     stiffness: float
     relaxation_time: float
+    cubic: float = 0.0
     name: str = "Maxwell branch"
 
     def moment(self, at: Crossing) -> Any:
@@ -222,10 +224,11 @@ class Maxwell:
         return {"angle": self._stretch(at)}
 
     def _stretch(self, at: Crossing) -> Any:
-        """Exact for a constant rate over the step: α_n e^(−h/τ) + γ̇ τ (1 − e^(−h/τ))."""
+        """α_n e^(−h/τ) + Δ(γ + c γ³) τ/h (1 − e^(−h/τ)): exact for a constant rate."""
         tau = at.number(self.relaxation_time)
         decay = exp(-1 / (tau * at.per_time))
-        return at.past("angle") * decay + at.rate * tau * (1 - decay)
+        cubic = at.number(self.cubic) * (at.gamma**3 - at.gamma_n**3)
+        return at.past("angle") * decay + (at.change + cubic) * at.per_time * tau * (1 - decay)
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,7 +284,7 @@ class DahlFriction:
 
 @dataclass(frozen=True, slots=True)
 class SlidingFriction:
-    """M = m_c γ̇/√(γ̇² + v²): Coulomb friction that does not stick, so that a hold has none.
+    """M = m_c tanh(γ̇/v): Coulomb friction that does not stick, so that a hold has none.
 
     Attributes:
         limit: m_c [N mm].
@@ -293,8 +296,9 @@ class SlidingFriction:
     name: str = "sliding friction"
 
     def moment(self, at: Crossing) -> Any:
-        """The rounded sign of the rate."""
-        return at.number(self.limit) * at.rate / sqrt(at.rate**2 + at.number(self.floor) ** 2)
+        """The rounded sign of the rate, cut off where round-off has made it one."""
+        sign = max_value(min_value(at.rate / at.number(self.floor), 20), -20)
+        return at.number(self.limit) * tanh(sign)
 
     def history(self, at: Crossing) -> dict[str, Any]:
         """None."""
