@@ -305,8 +305,9 @@ def _least(p: Parameter, value: float) -> float:
 
 
 def _uncertainty(J: Array) -> tuple[Array, Array, Array]:
-    """For unit noise: standard errors, infinite where nothing depends on it; correlations;
-    covariance.
+    """Standard errors (infinite where nothing depends on it), correlations, covariance.
+
+    All for a noise of one unit.
     """
     scale = np.linalg.norm(J, axis=0)
     dead = scale == 0.0
