@@ -31,6 +31,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (InputError, SolveError) as error:
         say(" ".join(str(error).split()))
         code = error.exit_code
+    except BrokenPipeError:
+        # Whoever read along has seen enough.
+        sys.stdout = open(os.devnull, "w")
+        code = 0
     except OSError as error:
         # What a command without results of its own could not read or write.
         place = f"{error.filename}: " if error.filename else ""

@@ -12,7 +12,7 @@ import pyvista as pv
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import WARP, WEFT, Net, single_tow
-from fabric_fenicsx.output import paraview
+from fabric_fenicsx.output import files
 from fabric_fenicsx.output.lines import COLOURS
 from fabric_fenicsx.output.paraview import TimeSeries
 from fabric_fenicsx.output.pictures import VIEWS, draw_net
@@ -182,7 +182,7 @@ def test_killed_writer_leaves_a_series_that_opens_and_resumes(
         move(source, target)
 
     move = os.replace
-    monkeypatch.setattr(paraview.os, "replace", stop)
+    monkeypatch.setattr(files.os, "replace", stop)
     with pytest.raises(Killed):
         series.add(at_rest(NET, 0.5))
     monkeypatch.undo()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import traceback
 from collections.abc import Callable
@@ -22,7 +23,8 @@ def collective(action: Callable[[Any], int], folder: Path | None = None) -> int:
     """Do on every rank what may fail on any of them; returns the exit code.
 
     Bad input is one line from rank 0. Whatever else goes wrong on one of several ranks ends all of
-    them: the others would wait for ever.
+    them: the others would wait for ever. SIGTERM, which mpirun and batch systems send before they
+    kill, ends a run like Ctrl-C.
 
     Args:
         action: given MPI's world; its exit code is this one's.
@@ -32,21 +34,17 @@ def collective(action: Callable[[Any], int], folder: Path | None = None) -> int:
 
     comm = MPI.COMM_WORLD
     guard = comm.Dup()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return action(comm)
-    except (InputError, SolveError, KeyboardInterrupt) as error:
-        interrupted = isinstance(error, KeyboardInterrupt)
-        code = 130 if isinstance(error, KeyboardInterrupt) else error.exit_code
-        line = " ".join(str(error).split())
-        if interrupted:
-            line = "interrupted: "
-            line += (
-                "nothing has been written"
-                if folder is None
-                else f"accepted steps are in {folder}, --resume goes on from the last"
-            )
+    except (InputError, SolveError, KeyboardInterrupt, OSError) as error:
+        # A second Ctrl-C must not come in between.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        alone = isinstance(error, (KeyboardInterrupt, OSError))
+        code, line = _told(error, folder)
         say(line)
-        if not _all_come(guard, 2.0 if interrupted else PATIENCE):
+        if not _all_come(guard, 2.0 if alone else PATIENCE):
             if comm.rank != 0:
                 print(line, file=sys.stderr, flush=True)
             comm.Abort(code)
@@ -58,6 +56,22 @@ def collective(action: Callable[[Any], int], folder: Path | None = None) -> int:
         sys.stderr.flush()
         comm.Abort(1)
         return 1
+
+
+def _told(error: BaseException, folder: Path | None) -> tuple[int, str]:
+    """Exit code and line of what ended an action."""
+    kept = "nothing has been written"
+    if folder is not None:
+        kept = f"accepted steps are in {folder}, --resume goes on from the last"
+    if isinstance(error, KeyboardInterrupt):
+        return 130, f"interrupted: {kept}"
+    if isinstance(error, OSError):
+        reason = error.strerror or " ".join(str(error).split())
+        place = error.filename or folder
+        what = f"{place} cannot be written" if place else "a file cannot be written"
+        return SolveError.exit_code, f"stopped: {what} ({reason}); {kept}"
+    assert isinstance(error, (InputError, SolveError))
+    return error.exit_code, " ".join(str(error).split())
 
 
 def from_root(comm: Any, load: Callable[[], Any]) -> Any:

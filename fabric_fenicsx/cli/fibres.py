@@ -37,6 +37,7 @@ def fibres(
     over that of the flat sheet.
     """
     from ..output.fibres import fibre_map
+    from ..output.files import write_vtk
 
     results, mirror, _ = opened(folder, mirror)
     paths = out or [folder / "fibres.csv", folder / "fibres.vtp"]
@@ -51,7 +52,7 @@ def fibres(
         if path.suffix == ".csv":
             table.write_csv(path)
         elif path.suffix == ".vtp":
-            table.surface().save(path)
+            write_vtk(path, table.surface())
         else:
             surface = table.surface()
             data = {name: surface[name] for name in surface.point_data}

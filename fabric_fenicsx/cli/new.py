@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +21,7 @@ def new(
     ] = None,
 ) -> None:
     """Write a commented case file: every key at its default, with unit and what is allowed."""
+    from ..output.files import write_text
     from ..rigs.keys import CASES
     from ..rigs.write_case import template
 
@@ -30,7 +30,5 @@ def new(
     if path.exists():
         raise InputError(f"{path}: exists, allowed is a new file")
     writable(path, (".yaml", ".yml"))
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(template(rig), encoding="utf-8")
-    os.replace(partial, path)
+    write_text(path, template(rig))
     print(path)

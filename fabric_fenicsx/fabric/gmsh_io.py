@@ -84,7 +84,19 @@ def write_msh(fabric: TowPaths, path: str | Path) -> None:
             _add_group(gmsh, name, curves)
         _add_group(gmsh, "tow_ends", ends)
         gmsh.model.mesh.generate(1)
-        gmsh.write(str(path))
+        _write_whole(gmsh, path)
+
+
+def _write_whole(gmsh: Any, path: Path) -> None:
+    """Write beside the place, then move; gmsh does not tell when it could not write all."""
+    partial = path.with_name(f"{path.stem}.partial.msh")
+    try:
+        gmsh.write(str(partial))
+        if not partial.exists() or not partial.read_bytes().rstrip().endswith(b"$EndElements"):
+            raise InputError(f"{path}: cannot be written whole; a place with room is allowed")
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def read_msh(path: str | Path, *, crossing_gap: float = 0.0) -> Net:

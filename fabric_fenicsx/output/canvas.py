@@ -10,6 +10,8 @@ from typing import Any
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkLogger
 
+from fabric_fenicsx.output.files import replacing
+
 __all__ = ["canvas", "headline"]
 
 Light = tuple[tuple[float, float, float], float]
@@ -43,7 +45,8 @@ def canvas(
                 plotter.show()
             else:
                 Path(path).parent.mkdir(parents=True, exist_ok=True)
-                plotter.screenshot(str(path))
+                with replacing(Path(path)) as partial:
+                    plotter.screenshot(str(partial))
         finally:
             plotter.close()
 

@@ -8,7 +8,6 @@ between the tows keeps its sides (Prodromou & Chen, Composites A 28, 1997).
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ import pyvista as pv
 
 from fabric_fenicsx.fabric.crossings import crossing_numbers, reference_angle
 from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.output.files import write_text
 from fabric_fenicsx.output.snapshot import Snapshot
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
 
@@ -72,9 +72,7 @@ class FibreMap:
         columns["density_factor"] = self.density
         columns["mould"] = self.mould
         columns["moved_mm"] = self.moved
-        partial = path.with_name(path.name + ".partial")
-        pd.DataFrame(columns).to_csv(partial, index=False, float_format="%.9g")
-        os.replace(partial, path)
+        write_text(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.9g"))
 
     def surface(self) -> pv.PolyData:
         """The fabric's surface: a four-cornered face for each of its meshes, data at crossings."""

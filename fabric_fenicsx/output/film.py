@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
@@ -14,6 +13,7 @@ import numpy as np
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.output.files import replacing
 from fabric_fenicsx.output.lines import COLOURS, scale_limits, tow_lines
 from fabric_fenicsx.output.pictures import draw_net
 from fabric_fenicsx.output.snapshot import Snapshot
@@ -104,15 +104,11 @@ def write_film(
                 frame=frame,
             )
             progress(number + 1)
-        partial = path.with_name(f".{path.name}.partial{path.suffix}")
-        try:
+        with replacing(path) as partial:
             if program is None:
                 _gif(partial, pictures, rate)
             else:
                 _mp4(program, partial, Path(folder), len(pictures), rate)
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)
 
 
 def _gif(path: Path, pictures: list[Path], rate: float) -> None:

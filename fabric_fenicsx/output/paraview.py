@@ -8,7 +8,6 @@ killed at any moment leaves a series that opens.
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,10 +20,11 @@ import numpy.typing as npt
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkDataArray, vtkObject, vtkPoints
 from vtkmodules.vtkCommonDataModel import VTK_LINE, VTK_VERTEX, vtkCellArray, vtkUnstructuredGrid
-from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader, vtkXMLUnstructuredGridWriter
+from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.output.files import write_text, write_vtk
 from fabric_fenicsx.output.snapshot import Snapshot
 
 __all__ = ["TimeSeries", "listed_steps", "read_step"]
@@ -77,7 +77,9 @@ class TimeSeries:
             self._write_collection(series)
         kept = {_file(self._folder, series, n).name for series in self._grids for n in self._steps}
         for path in list(self._folder.iterdir()):
-            ours = re.fullmatch(r"(tows|crossings)(_\d{5,}\.vtu(\.part)?|\.pvd\.part)", path.name)
+            ours = re.fullmatch(
+                r"(tows|crossings)(_\d{5,}(\.partial)?\.vtu|\.partial\.pvd)", path.name
+            )
             if ours and path.name not in kept:
                 path.unlink()
         if "crossings" not in self._grids:
@@ -120,7 +122,7 @@ class TimeSeries:
             else:
                 _add_crossings(step, self._net, snapshot)
             step.GetFieldData().AddArray(_array("TimeValue", np.array([snapshot.time])))
-            _write_grid(step, _file(self._folder, series, number))
+            write_vtk(_file(self._folder, series, number), step)
         self._steps[number] = float(snapshot.time)
         for series in self._grids:
             self._write_collection(series)
@@ -138,10 +140,8 @@ class TimeSeries:
             attributes["file"] = _file(self._folder, series, number).name
             ET.SubElement(collection, "DataSet", attributes)
         ET.indent(root)
-        path = self._folder / f"{series}.pvd"
-        unfinished = path.with_name(path.name + ".part")
-        ET.ElementTree(root).write(unfinished, encoding="utf-8", xml_declaration=True)
-        os.replace(unfinished, path)
+        text = ET.tostring(root, encoding="unicode", xml_declaration=True)
+        write_text(self._folder / f"{series}.pvd", text)
 
 
 def listed_steps(folder: Path, *, crossings: bool) -> dict[int, float]:
@@ -295,16 +295,3 @@ def _add_crossings(grid: vtkUnstructuredGrid, net: Net, snapshot: Snapshot) -> N
     at_points.AddArray(_array("shear_angle_deg", shear))
     at_points.AddArray(_array("angle_deg", 90.0 - shear))
     at_points.AddArray(_array("moment", snapshot.crossing_moment))
-
-
-def _write_grid(grid: vtkUnstructuredGrid, path: Path) -> None:
-    unfinished = path.with_name(path.name + ".part")
-    writer = vtkXMLUnstructuredGridWriter()
-    writer.SetFileName(str(unfinished))
-    writer.SetInputData(grid)
-    writer.SetDataModeToAppended()
-    writer.EncodeAppendedDataOff()
-    writer.SetCompressorTypeToLZ4()  # ten times as fast as zlib, files twice as large
-    if writer.Write() != 1 or not unfinished.exists():
-        raise OSError(f"{path}: could not be written")
-    os.replace(unfinished, path)

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ import pyvista as pv
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.output.files import write_npz, write_vtk
 from fabric_fenicsx.output.mirror import whole_sheet
 from fabric_fenicsx.output.paraview import listed_steps, read_step
 from fabric_fenicsx.output.snapshot import Snapshot
@@ -121,17 +121,14 @@ def write_setup(
         net: the net.
         tools: shapes of the tools, placed at the origin.
     """
-    path = folder / "net.npz"
-    partial = path.with_name(path.name + ".partial")
-    with partial.open("wb") as file:
-        np.savez_compressed(file, **{f.name: getattr(net, f.name) for f in fields(Net)})
-    os.replace(partial, path)
+    arrays = {f.name: getattr(net, f.name) for f in fields(Net)}
+    write_npz(folder / "net.npz", arrays, compressed=True)
     shapes = folder / "tools"
     for old in shapes.glob("*.vtp"):
         old.unlink()
     for tool in tools:
         shapes.mkdir(exist_ok=True)
-        triangulated(tool).save(shapes / f"{tool.name}.vtp")
+        write_vtk(shapes / f"{tool.name}.vtp", triangulated(tool))
 
 
 def read_net(path: Path) -> Net:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
@@ -22,6 +21,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_rgb
 
 from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.output.files import write_text
 from fabric_fenicsx.output.lines import COLOURS, round_step, scale_limits, tow_lines, tow_spacing
 from fabric_fenicsx.output.pictures import SEQUENTIAL
 from fabric_fenicsx.output.snapshot import Snapshot
@@ -92,9 +92,7 @@ def write_scene(
     text = text.replace("@TITLE@", escape(title))
     text = text.replace("@DATA@", json.dumps(data).replace("</", "<\\/"))
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
+    write_text(path, text)
 
 
 def _coloured(name: str, frames: Sequence[Frame]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fabric.net import WEFT, Net
+from ..output.files import replacing
 from ..output.pictures import draw_net
 from ..output.snapshot import Snapshot
 from ..solving.model import Model, Support
@@ -141,4 +142,5 @@ def _draw(session: Session, table: dict[str, Array]) -> None:
     axes.set(xlabel="x [mm]", ylabel="z [mm]", aspect="equal")
     axes.grid(alpha=0.3)
     axes.legend()
-    figure.savefig(session.folder / "shape.png", dpi=150)
+    with replacing(session.folder / "shape.png") as path:
+        figure.savefig(path, dpi=150)

@@ -23,6 +23,7 @@ from ..fabric.layout import TowLayout
 from ..fabric.net import WARP, WEFT, Net
 from ..fabric.section import RectangularSection
 from ..fabric.sheet import Sheet
+from ..output.files import write_text
 from ..solving.parts import CrossoverLaw
 from ..solving.stepping import StepControl
 from .cases import Common, CrossoverKeys, SolverKeys, TowKeys
@@ -169,7 +170,8 @@ def tow_net(
 def write_table(session: Session, name: str, columns: dict[str, npt.NDArray[Any]]) -> None:
     """Write a CSV into the results, on rank 0."""
     if session.root:
-        pd.DataFrame(columns).to_csv(session.folder / name, index=False, float_format="%.9g")
+        text = pd.DataFrame(columns).to_csv(index=False, float_format="%.9g")
+        write_text(session.folder / name, text)
 
 
 def extend(summary: dict[str, Any], quantities: dict[str, Any], session: Session) -> dict[str, Any]:

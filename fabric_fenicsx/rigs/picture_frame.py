@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fabric.net import Net
+from ..output.files import replacing
 from ..output.pictures import draw_net
 from ..output.snapshot import Snapshot
 from ..solving.model import Model, Support
@@ -176,4 +177,5 @@ def _draw(session: Session, model: Model, last: Snapshot, columns: dict[str, Arr
     against_time.set(xlabel="time [s]")
     for axes in (against_angle, against_time):
         axes.grid(alpha=0.3)
-    figure.savefig(session.folder / "curve.png", dpi=150)
+    with replacing(session.folder / "curve.png") as path:
+        figure.savefig(path, dpi=150)

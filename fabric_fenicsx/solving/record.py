@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from ..errors import InputError
 from ..fabric.net import Net
+from ..output.files import replacing, write_npz, write_text
 from ..output.paraview import TimeSeries
 from ..output.results import read_net, write_setup
 from ..output.snapshot import Snapshot
@@ -117,8 +118,7 @@ class Record:
             self._open(resume_at)
             (folder / "case.yaml").unlink(missing_ok=True)
             if case_text is not None:
-                with _replacing(folder / "case.yaml") as path:
-                    path.write_text(case_text, encoding="utf-8")
+                write_text(folder / "case.yaml", case_text)
         past = model.comm.bcast(self.rows[-1] if self.rows else None)
         self._balance = Balance(model, past)
 
@@ -159,7 +159,7 @@ class Record:
             self._series.add(
                 snapshot, {tool.name: model.tool_place(tool.name) for tool in model.tools}
             )
-            with _replacing(self.folder / "steps.csv") as path, path.open("w", newline="") as file:
+            with replacing(self.folder / "steps.csv") as path, path.open("w", newline="") as file:
                 writer = csv.DictWriter(file, list(row))
                 writer.writeheader()
                 writer.writerows(self.rows)
@@ -180,25 +180,23 @@ class Record:
         whole = {name: disc.gather_nodes(values[:n]) for name, values in arrays.items()}
         histories = self.model.histories.save()
         if self._root:
-            with _replacing(self.steps / f"step_{step.number:05d}.npz") as path:
-                with path.open("wb") as file:
-                    np.savez(
-                        file,
-                        schema=STEP_SCHEMA,
-                        time=step.time,
-                        number=step.number,
-                        previous_steps=predictor.lengths,
-                        predictor_order=predictor.order,
-                        next_step=state.next_step,
-                        **whole,
-                        **{f"history: {k}": v for k, v in histories.items()},
-                    )
+            scalars = {
+                "schema": STEP_SCHEMA,
+                "time": step.time,
+                "number": step.number,
+                "previous_steps": predictor.lengths,
+                "predictor_order": predictor.order,
+                "next_step": state.next_step,
+            }
+            arrays = {name: np.asarray(value) for name, value in scalars.items()} | whole
+            arrays |= {f"history: {name}": values for name, values in histories.items()}
+            path = self.steps / f"step_{step.number:05d}.npz"
+            write_npz(path, arrays, compressed=False)
 
 
 def write_result(folder: Path, result: dict[str, Any]) -> None:
     """Write result.json; one rank calls it."""
-    with _replacing(folder / "result.json") as path:
-        path.write_text(json.dumps(result, indent=2) + "\n")
+    write_text(folder / "result.json", json.dumps(result, indent=2) + "\n")
 
 
 def load_state(path: Path, stepper: Stepper) -> None:
@@ -264,20 +262,3 @@ def _same(one: Net, other: Net) -> bool:
         and np.array_equal(one.crossings, other.crossings)
         and bool(np.allclose(one.points, other.points, rtol=0.0, atol=1e-9))
     )
-
-
-class _replacing:
-    """A path to write to, moved to its place when the block ends without an error."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.partial = path.with_name(path.name + ".partial")
-
-    def __enter__(self) -> Path:
-        return self.partial
-
-    def __exit__(self, kind: Any, *rest: Any) -> None:
-        if kind is None:
-            os.replace(self.partial, self.path)
-        else:
-            self.partial.unlink(missing_ok=True)

@@ -1,0 +1,81 @@
+"""Files that are whole or not there: written beside their place, then moved to it."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
+
+__all__ = ["replacing", "write_npz", "write_text", "write_vtk"]
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A path to write to, moved to its place when the block ends without an error.
+
+    Args:
+        path: the file; what is written keeps its ending, which tells some writers the format.
+    """
+    partial = path.with_name(f"{path.stem}.partial{path.suffix}")
+    try:
+        yield partial
+        os.replace(partial, path)
+    except OSError as error:
+        if error.filename is None and error.errno is not None:
+            raise OSError(error.errno, error.strerror, str(path)) from None
+        raise
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text as UTF-8.
+
+    Raises:
+        OSError: it cannot be written; what was there before stays.
+    """
+    _write(path, text.encode("utf-8"))
+
+
+def write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]], *, compressed: bool) -> None:
+    """Write arrays by their names.
+
+    Raises:
+        OSError: they cannot be written; what was there before stays.
+    """
+    # In memory first: an archive that cannot be closed complains on its own behalf.
+    memory = io.BytesIO()
+    (np.savez_compressed if compressed else np.savez)(memory, **arrays)
+    _write(path, memory.getbuffer())
+
+
+def write_vtk(path: Path, data: Any) -> None:
+    """Write a vtkPolyData (.vtp) or a vtkUnstructuredGrid (.vtu).
+
+    Raises:
+        OSError: it cannot be written; what was there before stays.
+    """
+    polygons = data.IsA("vtkPolyData")
+    writer: Any = vtkXMLPolyDataWriter() if polygons else vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(data)
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressorTypeToLZ4()  # ten times as fast as zlib, files twice as large
+    # VTK itself dies of a full disk.
+    writer.WriteToOutputStringOn()
+    if writer.Write() != 1:
+        raise OSError(f"{path}: VTK cannot write it")
+    text = writer.GetOutputString()
+    _write(path, text if isinstance(text, bytes) else text.encode("utf-8"))
+
+
+def _write(path: Path, data: bytes | memoryview) -> None:
+    with replacing(path) as partial:
+        partial.write_bytes(data)
