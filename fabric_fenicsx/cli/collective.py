@@ -34,13 +34,14 @@ def collective(action: Callable[[Any], int], folder: Path | None = None) -> int:
 
     comm = MPI.COMM_WORLD
     guard = comm.Dup()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return action(comm)
     except (InputError, SolveError, KeyboardInterrupt, OSError) as error:
         # A second Ctrl-C must not come in between.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        for number in before:
+            signal.signal(number, signal.SIG_IGN)
         alone = isinstance(error, (KeyboardInterrupt, OSError))
         code, line = _told(error, folder)
         say(line)
@@ -56,6 +57,9 @@ def collective(action: Callable[[Any], int], folder: Path | None = None) -> int:
         sys.stderr.flush()
         comm.Abort(1)
         return 1
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _told(error: BaseException, folder: Path | None) -> tuple[int, str]:

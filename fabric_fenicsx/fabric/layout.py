@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from .net import WARP, WEFT
 from .outline import Outline
-from .paths import ROUNDING, TowPath, divide
+from .paths import ROUNDING, TowPath, check_size, divide
 from .weave import PLAIN, WeavePattern
 
 __all__ = ["TowFamily", "TowLayout", "across", "along", "spaced_layout"]
@@ -312,7 +312,7 @@ def spaced_layout(
     Raises:
         ValueError: the layout cannot be.
     """
-    families: list[TowFamily] = []
+    given = []
     for name, family, angle, spacing in (
         ("warp", WARP, warp_angle, warp_spacing),
         ("weft", WEFT, weft_angle, weft_spacing),
@@ -320,7 +320,11 @@ def spaced_layout(
         gaps = np.atleast_1d(np.array(spacing, dtype=np.float64))
         if not gaps.size or not (np.isfinite(gaps) & (gaps > 0.0)).all():
             raise ValueError(f"tows: {name} spacing is {spacing}; lengths above 0 mm are needed")
-        low, high = outline.extent(across(family, angle))
+        given.append((name, angle, spacing, gaps, outline.extent(across(family, angle))))
+    widths = [(high - low, float(gaps.mean())) for _, _, _, gaps, (low, high) in given]
+    check_size(widths[0], widths[1], subdivisions)
+    families: list[TowFamily] = []
+    for name, angle, spacing, gaps, (low, high) in given:
         positions = _positions(gaps, low, high)
         if not positions:
             raise ValueError(

@@ -9,10 +9,13 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["ROUNDING", "TowPath", "TowPaths", "divide"]
+__all__ = ["ROUNDING", "TowPath", "TowPaths", "check_size", "divide"]
 
 ROUNDING = 1e-9
 """Part of a length below which two lengths are the same."""
+
+MOST_CELLS = 4_000_000
+"""Of a net: beyond it a length is rather in the wrong unit than meant."""
 
 Floats = npt.NDArray[np.float64]
 
@@ -76,3 +79,22 @@ def divide(
     cells = np.floor(subdivisions * pieces / spacing + 0.5 + ROUNDING).astype(np.int64)
     inner = (stations[:-1] >= crossings[0]) & (stations[1:] <= crossings[-1])
     return np.where(inner, subdivisions, np.maximum(cells, 1))
+
+
+def check_size(warp: tuple[float, float], weft: tuple[float, float], subdivisions: int) -> None:
+    """Make sure that a sheet has no more cells than a machine can hold, before it is made.
+
+    Args:
+        warp: extent of the sheet across the warp tows and distance of these [mm].
+        weft: likewise across the weft tows.
+        subdivisions: cells between two neighbouring crossings.
+
+    Raises:
+        ValueError: it has more than MOST_CELLS.
+    """
+    cells = 2.0 * (warp[0] / warp[1] + 1.0) * (weft[0] / weft[1] + 1.0) * subdivisions
+    if not cells <= MOST_CELLS:
+        raise ValueError(
+            f"sheet: {warp[0]:g} mm by {weft[0]:g} mm with tows {warp[1]:g} and {weft[1]:g} mm "
+            f"apart has some {cells:.1e} cells; at most {MOST_CELLS} are allowed"
+        )

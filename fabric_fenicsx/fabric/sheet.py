@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fabric_fenicsx.fabric.net import WARP
-from fabric_fenicsx.fabric.paths import ROUNDING, TowPath, divide
+from fabric_fenicsx.fabric.paths import ROUNDING, TowPath, check_size, divide
 
 __all__ = ["Sheet", "centred_sheet", "spaced_sheet"]
 
@@ -120,12 +120,15 @@ def centred_sheet(
         The sheet.
     """
     ranges, tows = [], []
-    for name, extent, key, spacing in (
+    given = (
         ("width", width, "warp_spacing", warp_spacing),
         ("length", length, "weft_spacing", weft_spacing),
-    ):
+    )
+    for name, extent, key, spacing in given:
         _positive(name, extent)
         _positive(key, spacing)
+    check_size((width, warp_spacing), (length, weft_spacing), subdivisions)
+    for name, extent, key, spacing in given:
         half = floor(extent / 2.0 / spacing + ROUNDING)
         if half < 1:
             raise ValueError(
@@ -159,12 +162,15 @@ def spaced_sheet(
         The sheet.
     """
     tows = []
-    for name, ends, key, spacing in (
-        ("x_range", x_range, "warp_spacing", warp_spacing),
-        ("y_range", y_range, "weft_spacing", weft_spacing),
-    ):
-        low, high = _checked_range(name, ends)
+    given = (
+        ("x_range", _checked_range("x_range", x_range), "warp_spacing", warp_spacing),
+        ("y_range", _checked_range("y_range", y_range), "weft_spacing", weft_spacing),
+    )
+    for _, _, key, spacing in given:
         _positive(key, spacing)
+    across = [high - low for _, (low, high), _, _ in given]
+    check_size((across[0], warp_spacing), (across[1], weft_spacing), subdivisions)
+    for name, (low, high), key, spacing in given:
         count = floor((high - low) / spacing + ROUNDING)
         if count < 1:
             raise ValueError(

@@ -155,14 +155,16 @@ def one_of(names: Sequence[str]) -> str:
     return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def plain(value: Any) -> str:
-    """A value as YAML would show it on one line, shortened."""
+def plain(value: Any, depth: int = 3) -> str:
+    """A value as YAML would show it on one line, shortened; lists as deep as ``depth``."""
     if value is None or isinstance(value, bool):
         text = {None: "null", True: "true", False: "false"}[value]
     elif isinstance(value, str):
         text = repr(value)
     elif isinstance(value, list):
-        text = "[" + ", ".join(plain(entry) for entry in value[:8]) + "]"
+        # A list may hold itself.
+        entries = [plain(entry, depth - 1) for entry in value[:8]] if depth else ["..."]
+        text = "[" + ", ".join(entries) + "]"
     elif isinstance(value, dict):
         text = "a mapping"
     elif isinstance(value, float):

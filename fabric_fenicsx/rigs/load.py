@@ -103,7 +103,11 @@ def _no_sheet(case: Case) -> str | None:
         match case:
             case DrapeCase(sheet=keys):
                 centred_sheet(
-                    keys.width_mm, keys.length_mm, keys.warp_spacing_mm, keys.weft_spacing_mm
+                    keys.width_mm,
+                    keys.length_mm,
+                    keys.warp_spacing_mm,
+                    keys.weft_spacing_mm,
+                    subdivisions=keys.subdivisions,
                 )
             case PictureFrameCase():
                 side = (0.0, case.fabric_length_mm)
