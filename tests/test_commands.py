@@ -36,7 +36,7 @@ def test_new_writes_the_defaults_with_every_key(rig, tmp_path, capsys):
     text = path.read_text(encoding="utf-8")
     for key in documented(CASES[rig]):
         assert f"{key.name.replace('[]', '').split('.')[-1]}:" in text
-    assert max(map(len, text.splitlines())) <= 116
+    assert max(map(len, text.splitlines())) <= 120
     path.write_text("mine")
     assert command("new", rig, path) == 2
     assert "exists, allowed is a new file" in capsys.readouterr().err

@@ -82,9 +82,11 @@ def _group(model: type[BaseModel], depth: int) -> Iterator[str]:
             mark = "  " * depth + ("# " if value is None else "")
             yield from (f"{mark}{line}" for line in block)
         elif value is None or value in ("", [], {}):
-            group = group_of(field.annotation)
-            example = "" if group is None else _example(group)
-            yield from _entry(f"# {name}: {example}", field, depth)
+            yield from _entry(f"# {name}:", field, depth)
+            if (group := group_of(field.annotation)) is not None:
+                # An entry of a list of groups, to be filled in.
+                yield "  " * depth + "#   -"
+                yield from ("  " * depth + f"# {line}" for line in _group(group, 2))
         else:
             yield from _entry(f"{name}: {_plain(value)}", field, depth)
 
@@ -109,11 +111,6 @@ def _about(line: str, field: FieldInfo) -> str:
     name = line.removeprefix("# ").partition(":")[0]
     label = f" [{unit(name)}]" if unit(name) else ""
     return f"{words}{label}; {allowed_by(field)}"
-
-
-def _example(group: type[BaseModel]) -> str:
-    """An entry of a list of groups, to be filled in."""
-    return "[{" + ", ".join(f"{name}: " for name in group.model_fields) + "}]"
 
 
 def _plain(value: Any) -> str:
