@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["ROUNDING", "TowPath", "TowPaths", "check_size", "divide"]
+__all__ = ["MOST_CELLS", "ROUNDING", "TowPath", "TowPaths", "check_size", "divide"]
 
 ROUNDING = 1e-9
 """Part of a length below which two lengths are the same."""

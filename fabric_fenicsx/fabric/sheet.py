@@ -14,8 +14,8 @@ from math import floor, isfinite
 import numpy as np
 import numpy.typing as npt
 
-from fabric_fenicsx.fabric.net import WARP
-from fabric_fenicsx.fabric.paths import ROUNDING, TowPath, check_size, divide
+from fabric_fenicsx.fabric.net import WARP, WEFT
+from fabric_fenicsx.fabric.paths import MOST_CELLS, ROUNDING, TowPath, check_size, divide
 
 __all__ = ["Sheet", "centred_sheet", "spaced_sheet"]
 
@@ -54,6 +54,9 @@ class Sheet:
         if self.subdivisions < 1:
             raise ValueError(f"sheet: subdivisions is {self.subdivisions}; at least 1 is needed")
         _set(self, "subdivisions", int(self.subdivisions))
+        counts = (len(self.positions(k)) * float(self.divisions(k).sum()) for k in (WARP, WEFT))
+        if (cells := sum(counts)) > MOST_CELLS:
+            raise ValueError(f"sheet: {cells:.1e} cells; at most {MOST_CELLS} are allowed")
 
     def positions(self, family: int) -> npt.NDArray[np.float64]:
         """Where the tows of WARP or WEFT lie across their own direction [mm], (n_tows,)."""

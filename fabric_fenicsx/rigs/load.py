@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..errors import InputError
-from ..fabric.sheet import centred_sheet, spaced_sheet
-from .cases import CantileverCase, Case, DrapeCase, PictureFrameCase
+from .cases import Case, DrapeCase
+from .fabrics import fabrics, flat_sheet
 from .keys import CASES, one_of, plain
 from .validation import Place, dotted_place, mistakes, one_line, parse_yaml, read_yaml, suggestion
 
@@ -100,22 +100,11 @@ def _step(group: Any, part: str, place: list[str | int], dotted: str) -> str | i
 def _no_sheet(case: Case) -> str | None:
     """Why there is no such sheet, if the spacing of the tows does not fit into it."""
     try:
-        match case:
-            case DrapeCase(sheet=keys):
-                centred_sheet(
-                    keys.width_mm,
-                    keys.length_mm,
-                    keys.warp_spacing_mm,
-                    keys.weft_spacing_mm,
-                    subdivisions=keys.subdivisions,
-                )
-            case PictureFrameCase():
-                side = (0.0, case.fabric_length_mm)
-                spaced_sheet(side, side, case.warp_spacing_mm, case.weft_spacing_mm)
-            case CantileverCase():
-                for length in case.lengths_mm:
-                    width = (0.0, case.width_mm)
-                    spaced_sheet((0.0, length), width, case.warp_spacing_mm, case.weft_spacing_mm)
+        if isinstance(case, DrapeCase):
+            # A weave's own files count from the case's folder: they are read when it is run.
+            flat_sheet(case.model_copy(update={"weave": None}), Path())
+        else:
+            fabrics(case, Path())
     except ValueError as error:
         return str(error)
     return None

@@ -212,7 +212,7 @@ def load_state(path: Path, stepper: Stepper) -> None:
     try:
         with np.load(path, allow_pickle=False) as file:
             data = {name: file[name] for name in file.files}
-        schema = str(data.get("schema", STEP_SCHEMA))  # the first files did not say
+        schema = str(data.get("schema", "fabric-step/1"))  # the first did not say
         if schema != STEP_SCHEMA:
             raise ValueError(f"schema {schema}, this version reads {STEP_SCHEMA}")
         missing = {*STATE, *NUMBERS} - set(data)
