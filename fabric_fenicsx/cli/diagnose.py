@@ -169,7 +169,8 @@ def _try_out(path: Path, own: Sequence[Effect], tests: Sequence[Test]) -> None:
             for variant in effect.variants:
                 place = f"{path}: {effect.name}, {variant.label}"
                 try:
-                    first = variant.grid(amplitudes=False)[0] | {p.name: 1e-9 for p in variant.amplitudes}
+                    first = variant.grid(amplitudes=False)[0]
+                    first |= {p.name: 1e-9 for p in variant.amplitudes}
                     experiment.predict((variant,), start | first)
                 except Exception as error:
                     reason = " ".join(f"{type(error).__name__}: {error}".split())

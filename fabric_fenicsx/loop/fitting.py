@@ -196,6 +196,7 @@ def fit_from_grid(
     *,
     starts: int = 2,
     evaluations: int = 60,
+    robust: float | None = None,
 ) -> list[Fit]:
     """Add one of several forms of an effect to a fitted model.
 
@@ -208,6 +209,7 @@ def fit_from_grid(
         variants: the forms; those that share a parameter with the model are left out.
         starts: how many starts of each form are followed.
         evaluations: of the model at most, from each.
+        robust: see fit.
 
     Returns:
         The model with each form that has a solution.
@@ -244,7 +246,7 @@ def fit_from_grid(
             break
         try:
             model = (*base.variants, variant)
-            fits.append(fit(experiment, model, moved, rows, evaluations=evaluations))
+            fits.append(fit(experiment, model, moved, rows, evaluations=evaluations, robust=robust))
         except SolveError:
             continue
     return fits

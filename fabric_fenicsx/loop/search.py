@@ -38,6 +38,8 @@ ALARM = 0.01
 NEAR = 1.15
 #: χ² + k ln n by which a second effect must win, and by which a rival may lose.
 DECISIVE = 10.0
+#: χ² + k ln n by which any effect must win against the baseline.
+LEAST = 4.0
 #: Effects at most: any three of them would fit almost anything.
 MOST = 2
 #: Effects whose pairs with every other are tried where no single one explains the data.
@@ -138,6 +140,7 @@ class _Search:
         self._validated: dict[int, float] = {}
         # Their ids stay theirs as long as they live.
         self._kept: list[Fit] = []
+        self._both: list[Model] = []
         self.given = experiment.noise is not None
         self.noise = experiment.noise or self._noise_of(self.baseline)
         self._leave_out(self.baseline)
@@ -151,12 +154,6 @@ class _Search:
     def _leave_out(self, model: Fit) -> bool:
         """Leave out what stands out from a model's residual; whether that was anything new."""
         rows = self.readings.usable & ~self.outliers
-        try:
-            # What is far off must not pull the model towards itself.
-            start, limit = model.values, 3.0 * self.noise
-            model = fit(self.experiment, model.variants, start, self.rows, robust=limit)
-        except SolveError:
-            pass
         found = spikes(model.residual, self.readings, rows)
         found |= lone(model.residual, self.readings, rows & ~found)
         if found.any():
@@ -169,12 +166,28 @@ class _Search:
             )
         return bool(found.any())
 
+    def _robustly(self, model: Fit) -> Fit:
+        """A model fitted again so that readings far off pull but little."""
+        limit = 3.0 * self.noise
+        try:
+            return fit(self.experiment, model.variants, model.values, self.rows, robust=limit)
+        except SolveError:
+            return model
+
+    def _most_robust(self, models: Sequence[Fit]) -> Fit:
+        """Of some models the one that explains most of the readings, whatever the others do."""
+        limit = 3.0 * self.noise
+        robust = [self._robustly(model) for model in models]
+        return min(robust, key=lambda one: _robust_sum(one, limit), default=self.baseline)
+
     def run(self) -> Diagnosis:
         """See diagnose_test."""
         candidates, singles = self._tried()
-        if singles and self._leave_out(singles[0].fit or self.baseline):
+        if singles and not self._explains(singles[0].fit or self.baseline):
             # A spike is seen better once the large part of the residual is gone.
-            candidates, singles = self._tried()
+            first = [c.fit for c in singles[:FIRST] if c.fit is not None]
+            if self._leave_out(self._most_robust(first)):
+                candidates, singles = self._tried()
         if not self.given and singles:
             self.noise = self._noise_of(singles[0].fit or self.baseline)
         nearest: Model = (self.baseline, ())
@@ -182,7 +195,7 @@ class _Search:
         quiet = explained and all(c.p_value >= ALARM for c in candidates)
         if not quiet:
             nearest, explained = self._choose(singles)
-            if not explained and self._leave_out(nearest[0]):
+            if not explained and self._leave_out(self._most_robust([m for m, _ in self._both])):
                 candidates, singles = self._tried()
                 nearest, explained = self._choose(singles)
         for candidate in candidates:
@@ -282,7 +295,13 @@ class _Search:
 
     def _best_variant(self, base: Fit, effect: Effect, *, starts: int = 2) -> Fit | None:
         fits = fit_from_grid(self.experiment, base, effect.variants, starts=starts)
-        return min(fits, key=self._criterion, default=None)
+        if not fits:
+            return None
+        best = min(fits, key=self._criterion)
+        # Few readings beyond a corner of the law can hold least squares in a local minimum.
+        start = self._robustly(best)
+        again = fit(self.experiment, best.variants, start.values, self.rows)
+        return min(best, again, key=self._criterion)
 
     def _choose(self, singles: list[Candidate]) -> tuple[Model, bool]:
         """The best model of one effect, or of two where one does not explain the data.
@@ -303,8 +322,7 @@ class _Search:
         pair, both_explain = self._first_that_explains(pairs)
         gain = self._criterion(single[0]) - self._criterion(pair[0])
         if not explained:
-            nearest = pair if gain > DECISIVE else single
-            return (pair, True) if both_explain else (nearest, False)
+            return (pair, both_explain) if gain > DECISIVE else (single, False)
         better = self._cross_validated(pair[0]) < 0.97 * self._cross_validated(single[0])
         return (pair, True) if gain > DECISIVE and better and both_explain else (single, True)
 
@@ -314,6 +332,9 @@ class _Search:
         near = [m for m in models if self._criterion(m[0]) < best + DECISIVE]
         if len(near) > 1:
             near.sort(key=lambda m: self._cross_validated(m[0]))
+        if best > self._criterion(self.baseline) - LEAST:
+            # What does not lower the criterion is not there, whatever a score says.
+            return near[0], False
         for model in near:
             if self._explains(model[0]):
                 return model, True
@@ -337,6 +358,7 @@ class _Search:
             again = self._best_variant(rest, effects[0])
             if again is not None and self._criterion(again) < self._criterion(both):
                 found[k] = (again, effects)
+        self._both = found
         return found
 
     # Judgement ----------------------------------------------------------------------------
@@ -438,6 +460,12 @@ class _Search:
                 if instead is not None and self._criterion(instead) < limit:
                     found[own.name].append(other.effect.name)
         return found
+
+
+def _robust_sum(model: Fit, limit: float) -> float:
+    """Sum of squares in which residuals beyond a limit count by their size only (soft L1)."""
+    z = (model.residual * model.weight)[model.used] / limit
+    return float(np.sum(2.0 * limit**2 * (np.sqrt(1.0 + z**2) - 1.0)))
 
 
 def _upper(freedom: int) -> float:
