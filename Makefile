@@ -32,7 +32,7 @@ export PYTHONNOUSERSITE := 1
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 
 .DEFAULT_GOAL := help
-.PHONY: help setup drape test test-slow check reference image clean
+.PHONY: help setup drape test test-slow check reference bench image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 12
@@ -66,6 +66,9 @@ check: setup ## lint, formatting and types
 
 reference: setup ## compute the table of verified numbers anew, docs/reference.md
 	$(VENV)/python scripts/reference_page.py
+
+bench: setup ## time the benchmark problems against other solvers (PEERS=a file, see the script)
+	$(VENV)/python tests/benchmarks/side_by_side.py $(PEERS)
 
 image: ## build the container image fabric-fenicsx
 	$(DOCKER) build -t fabric-fenicsx .

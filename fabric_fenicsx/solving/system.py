@@ -37,6 +37,7 @@ class System:
     Attributes:
         nodal_loads: dead forces and material moments on each local block, (n_blocks, 6)
             [N, N mm]; ghosts are ignored.
+        assemblies: how many residuals and tangents there were, for benchmarks.
         refresh: called after each new increment, for coefficients that depend on it otherwise than
             through UFL.
     """
@@ -61,6 +62,7 @@ class System:
         self.nodal_loads = np.zeros((len(net.local_nodes), BLOCK))
         self.refresh: list[Callable[[], None]] = []
         self.assemble_seconds = 0.0
+        self.assemblies = {"residual": 0, "tangent": 0}
         self._local = np.zeros(len(net.rows))
         self._lg_tows, self._lg_crossovers = net.maps()
         self._x = net.vector()
@@ -131,6 +133,7 @@ class System:
     def residual(self, F: PETSc.Vec) -> None:
         """Assemble the residual at the increment set last."""
         start = perf_counter()
+        self.assemblies["residual"] += 1
         net = self.net
         own = net.owned * BLOCK
         local = self._local
@@ -148,6 +151,7 @@ class System:
     def tangent(self, A: PETSc.Mat) -> None:
         """Assemble the tangent at the increment and section forces set last."""
         start = perf_counter()
+        self.assemblies["tangent"] += 1
         A.zeroEntries()
         A.setLGMap(self._lg_tows, self._lg_tows)
         _dolfinx.add_matrix(A, self._tangents["tows"])

@@ -59,8 +59,8 @@ def network(n: int, sub: int) -> Net:
     return whole
 
 
-def run(model: Model, tolerance: float, before: Any, after: Any) -> tuple[float, int, int]:
-    """Twenty equal steps to time 1; returns seconds, Newton iterations and accepted steps."""
+def run(model: Model, tolerance: float, before: Any, after: Any) -> dict[str, Any]:
+    """Twenty equal steps to time 1; returns what they cost."""
     set_time = model.set_time
 
     def moved(start: float, end: float) -> None:
@@ -74,7 +74,20 @@ def run(model: Model, tolerance: float, before: Any, after: Any) -> tuple[float,
     model.comm.barrier()
     start = perf_counter()
     stepper.run(1.0)
-    return perf_counter() - start, newton.iterations, stepper.number
+    seconds = perf_counter() - start
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return {
+        "ranks": model.comm.size,
+        "dofs": len(model.net.points) * 6,
+        "steps": stepper.number,
+        "newton_iterations": newton.iterations,
+        "factorisations": newton.factorisations,
+        "residuals": model.system.assemblies["residual"],
+        "tangents": model.system.assemblies["tangent"],
+        "solve_seconds": round(seconds, 3),
+        "peak_mb": round(model.comm.allreduce(peak), 1),
+        "converged": True,
+    }
 
 
 def frame(n: int, sub: int) -> dict[str, Any]:
@@ -102,9 +115,9 @@ def frame(n: int, sub: int) -> dict[str, Any]:
         rate = X[:, :1] * [-s, c, 0.0] + X[:, 1:2] * [c, -s, 0.0]
         forces.append(float(np.sum(model.reactions()[ends, :3] * rate)))
 
-    seconds, iterations, steps = run(model, 1e-6, lambda time: None, work_rate)
+    cost = run(model, 1e-6, lambda time: None, work_rate)
     return {
-        **account(model, seconds, iterations, steps),
+        **cost,
         "force": forces[-1],
         "rigid_tows": n**2 * 50.0 * END_ANGLE,
     }
@@ -124,7 +137,7 @@ def sheet(n: int, sub: int) -> dict[str, Any]:
     def load(time: float) -> None:
         loads[:, 2] = -weight * time
 
-    seconds, iterations, steps = run(model, 1e-7, load, lambda step: None)
+    cost = run(model, 1e-7, load, lambda step: None)
     u = model.disc.gather_nodes(model.fields.u_n.x.array.reshape(-1, 3)[: model.disc.owned])
 
     def at(x: float) -> float:
@@ -133,23 +146,9 @@ def sheet(n: int, sub: int) -> dict[str, Any]:
         return float(u[int(np.argmin(place)), 2])
 
     return {
-        **account(model, seconds, iterations, steps),
+        **cost,
         "z_corner": at(SPACING),
         "z_middle": at(SPACING * ((n + 1) // 2)),
-    }
-
-
-def account(model: Model, seconds: float, iterations: int, steps: int) -> dict[str, Any]:
-    """What a run cost."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    return {
-        "ranks": model.comm.size,
-        "dofs": len(model.net.points) * 6,
-        "steps": steps,
-        "newton_iterations": iterations,
-        "solve_seconds": round(seconds, 3),
-        "peak_mb": round(model.comm.allreduce(peak), 1),
-        "converged": True,
     }
 
 
