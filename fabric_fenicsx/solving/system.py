@@ -186,6 +186,8 @@ class System:
         own = self.net.owned
         work = self.nodal_loads[:own].copy()
         m = self.nodal_loads[:own, 3:]
+        if not m.any():
+            return work, np.zeros((own, 3, 3))
         theta = self.net.tows.w.x.array.reshape(-1, BLOCK)[:own, 3:]
         s = 1.0 + (theta * theta).sum(axis=1, keepdims=True) / 4.0
         work[:, 3:] = (m + np.cross(theta, m) / 2.0) / s
