@@ -40,6 +40,9 @@ NEAR = 1.15
 DECISIVE = 10.0
 #: χ² + k ln n by which any effect must win against the baseline.
 LEAST = 4.0
+#: Sigmas beyond which a reading pulls a fit less: it may be wrong, or lie beyond a corner of a law
+#: that the fit has not reached, where least squares would stay.
+FAR = 3.0
 #: Effects at most: any three of them would fit almost anything.
 MOST = 2
 #: Effects whose pairs with every other are tried where no single one explains the data.
@@ -140,7 +143,6 @@ class _Search:
         self._validated: dict[int, float] = {}
         # Their ids stay theirs as long as they live.
         self._kept: list[Fit] = []
-        self._both: list[Model] = []
         self.given = experiment.noise is not None
         self.noise = experiment.noise or self._noise_of(self.baseline)
         self._leave_out(self.baseline)
@@ -166,28 +168,12 @@ class _Search:
             )
         return bool(found.any())
 
-    def _robustly(self, model: Fit) -> Fit:
-        """A model fitted again so that readings far off pull but little."""
-        limit = 3.0 * self.noise
-        try:
-            return fit(self.experiment, model.variants, model.values, self.rows, robust=limit)
-        except SolveError:
-            return model
-
-    def _most_robust(self, models: Sequence[Fit]) -> Fit:
-        """Of some models the one that explains most of the readings, whatever the others do."""
-        limit = 3.0 * self.noise
-        robust = [self._robustly(model) for model in models]
-        return min(robust, key=lambda one: _robust_sum(one, limit), default=self.baseline)
-
     def run(self) -> Diagnosis:
         """See diagnose_test."""
         candidates, singles = self._tried()
-        if singles and not self._explains(singles[0].fit or self.baseline):
+        if singles and self._leave_out(singles[0].fit or self.baseline):
             # A spike is seen better once the large part of the residual is gone.
-            first = [c.fit for c in singles[:FIRST] if c.fit is not None]
-            if self._leave_out(self._most_robust(first)):
-                candidates, singles = self._tried()
+            candidates, singles = self._tried()
         if not self.given and singles:
             self.noise = self._noise_of(singles[0].fit or self.baseline)
         nearest: Model = (self.baseline, ())
@@ -195,7 +181,7 @@ class _Search:
         quiet = explained and all(c.p_value >= ALARM for c in candidates)
         if not quiet:
             nearest, explained = self._choose(singles)
-            if not explained and self._leave_out(self._most_robust([m for m, _ in self._both])):
+            if not explained and self._leave_out(nearest[0]):
                 candidates, singles = self._tried()
                 nearest, explained = self._choose(singles)
         for candidate in candidates:
@@ -206,6 +192,8 @@ class _Search:
         if quiet:
             verdict = "no_effect"
         chosen, effects = nearest if verdict == "effect_found" else (baseline, ())
+        if effects:
+            chosen = fit(self.experiment, chosen.variants, chosen.values, self.rows)
         self.progress(0.95, "rivals")
         return Diagnosis(
             experiment=self.experiment,
@@ -284,24 +272,20 @@ class _Search:
 
     # Fits ---------------------------------------------------------------------------------
 
-    def _criterion(self, model: Fit | None, noise: float | None = None) -> float:
-        """χ² + k ln n; smaller is better."""
+    def _criterion(self, model: Fit | None) -> float:
+        """χ² + k ln n; smaller is better. Residuals beyond a limit count by their size only."""
         if model is None:
             return float("inf")
-        noise = noise or self.noise
-        return model.sum_of_squares / noise**2 + len(model.values) * float(
-            np.log(max(int(model.used.sum()), 2))
-        )
+        limit = FAR * self.noise
+        z = (model.residual * model.weight)[model.used] / limit
+        size = 2.0 * FAR**2 * float(np.sum(np.sqrt(1.0 + z**2) - 1.0))
+        return size + len(model.values) * float(np.log(max(int(model.used.sum()), 2)))
 
     def _best_variant(self, base: Fit, effect: Effect, *, starts: int = 2) -> Fit | None:
-        fits = fit_from_grid(self.experiment, base, effect.variants, starts=starts)
-        if not fits:
-            return None
-        best = min(fits, key=self._criterion)
-        # Few readings beyond a corner of the law can hold least squares in a local minimum.
-        start = self._robustly(best)
-        again = fit(self.experiment, best.variants, start.values, self.rows)
-        return min(best, again, key=self._criterion)
+        fits = fit_from_grid(
+            self.experiment, base, effect.variants, starts=starts, robust=FAR * self.noise
+        )
+        return min(fits, key=self._criterion, default=None)
 
     def _choose(self, singles: list[Candidate]) -> tuple[Model, bool]:
         """The best model of one effect, or of two where one does not explain the data.
@@ -358,7 +342,6 @@ class _Search:
             again = self._best_variant(rest, effects[0])
             if again is not None and self._criterion(again) < self._criterion(both):
                 found[k] = (again, effects)
-        self._both = found
         return found
 
     # Judgement ----------------------------------------------------------------------------
@@ -460,12 +443,6 @@ class _Search:
                 if instead is not None and self._criterion(instead) < limit:
                     found[own.name].append(other.effect.name)
         return found
-
-
-def _robust_sum(model: Fit, limit: float) -> float:
-    """Sum of squares in which residuals beyond a limit count by their size only (soft L1)."""
-    z = (model.residual * model.weight)[model.used] / limit
-    return float(np.sum(2.0 * limit**2 * (np.sqrt(1.0 + z**2) - 1.0)))
 
 
 def _upper(freedom: int) -> float:
