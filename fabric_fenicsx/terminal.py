@@ -149,7 +149,7 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
             row = [_shown(error[when][kind]) for when in ("before", "after")]
             table.add_row(label, *row, _shown(error["noise"]))
         console.print(table)
-    console.print(f"report in {folder / 'report.json'}", soft_wrap=True)
+    console.print(f"report in {folder / 'report.html'}", soft_wrap=True)
 
 
 def summarise(result: dict[str, Any], folder: Any) -> None:

@@ -1,12 +1,17 @@
 """The command diagnose: from folders of measured data to a report."""
 
+import base64
 import json
 import math
 import os
 import subprocess
 import sys
+from html import unescape
+from html.parser import HTMLParser
+from xml.etree import ElementTree as ET
 
 import pytest
+import yaml
 from measurements.bad import CASES, EXECUTED
 from measurements.sets import sixty
 from test_cli import MPI, contents
@@ -88,10 +93,58 @@ def test_the_unexplained_says_what_came_nearest(diagnosed):
     assert report["best"]["error_fit"] > 1.5 * report["error"]["noise"]
 
 
+class Images(HTMLParser):
+    """What a page loads, and the images in it."""
+
+    def __init__(self):
+        super().__init__()
+        self.loaded, self.images = [], []
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        assert tag not in ("script", "link", "iframe")
+        self.loaded += [attributes[key] for key in ("src", "href", "data") if key in attributes]
+        if tag == "img":
+            self.images.append(attributes["src"])
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_page_stands_by_itself(diagnosed, name):
+    _, out = diagnosed[name]
+    text = (out / "report.html").read_text()
+    page = Images()
+    page.feed(text)
+    kinds = ("data", "residuals", "candidates")
+    assert len(page.images) == len(page.loaded) == len(kinds)
+    assert "url(" not in text and "@import" not in text
+    for source in page.images:
+        start, _, code = source.partition(",")
+        assert start == "data:image/svg+xml;base64"
+        assert ET.fromstring(base64.b64decode(code)).tag.endswith("svg")
+    for kind in kinds:
+        header = (out / f"picture_frame_{kind}.png").read_bytes()[:24]
+        assert header[:8] == b"\x89PNG\r\n\x1a\n" and int.from_bytes(header[16:20]) > 1000
+    report = report_of(out)
+    assert report["headline"] in unescape(text)
+    for candidate in report["candidates"]:
+        assert candidate["name"] in text
+
+
+def test_a_title_is_text_and_no_markup(tmp_path):
+    folder = tmp_path / "measured"
+    RECIPES["none-shear-declared"](folder)
+    path = folder / "measurement.yaml"
+    content = yaml.safe_load(path.read_text()) | {"title": "a < b <script>x</script>"}
+    path.write_text(yaml.safe_dump(content))
+    assert command("diagnose", folder, "--out", tmp_path / "out", "--quiet") == 0
+    assert "<script>" not in (tmp_path / "out" / "report.html").read_text()
+
+
 def test_the_same_data_give_the_same_report(diagnosed, tmp_path):
     folder, out = diagnosed["crossover_friction-dahl"]
     assert command("diagnose", folder, "--out", tmp_path, "--quiet") == 0
-    assert (tmp_path / "report.json").read_bytes() == (out / "report.json").read_bytes()
+    for name in ("report.json", "report.html"):
+        assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
 
 
 def test_effects_narrows_the_search(diagnosed, tmp_path, capsys):

@@ -131,14 +131,17 @@ def _report(
     progress: Callable[[float, str], None],
 ) -> dict[str, Any]:
     """Search and write; report.json comes last."""
+    from ..loop.page import write_page
     from ..loop.report import combined_report, test_report, write_report
 
-    reports = []
+    parts = []
     for number, (experiment, own) in enumerate(tests):
         diagnosis = _search(experiment, names, _part(progress, number, len(tests)))
-        reports.append(test_report(diagnosis, own))
-    report = combined_report(reports)
+        parts.append((diagnosis, test_report(diagnosis, own)))
+    report = combined_report([part for _, part in parts])
+    progress(1.0, "drawing")
     try:
+        write_page(out, parts)
         write_report(out, report)
     except OSError as error:
         raise InputError(f"{out}: the report cannot be written ({error.strerror})") from error
@@ -169,8 +172,9 @@ def _try_out(path: Path, own: Sequence[Effect], tests: Sequence[Test]) -> None:
             for variant in effect.variants:
                 place = f"{path}: {effect.name}, {variant.label}"
                 try:
-                    first = variant.grid(amplitudes=False)[0]
-                    first |= {p.name: 1e-9 for p in variant.amplitudes}
+                    first = variant.grid(amplitudes=False)[0] | {
+                        p.name: 1e-9 for p in variant.amplitudes
+                    }
                     experiment.predict((variant,), start | first)
                 except Exception as error:
                     reason = " ".join(f"{type(error).__name__}: {error}".split())
