@@ -129,7 +129,9 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
     for test, part in report.get("tests", {report["test"]: report}).items():
         console.print(f"{test}: {part['verdict']}", soft_wrap=True)
         console.print(part["headline"], soft_wrap=True)
-        table = Table("", "parameter", "value", "±", "unit", "rivals")
+        table = Table()
+        for heading in ("", "parameter", "value", "±", "unit", "rivals"):
+            table.add_column(heading, no_wrap=heading != "rivals", overflow="fold")
         model = part["model"]
         for effect in [{"name": "baseline", **part["baseline"], "rivals": []}, *part["effects"]]:
             # The baseline's as they are in the model that is reported.

@@ -19,6 +19,7 @@ from .keys import keys
 from .mesh import mesh
 from .new import new
 from .run import run
+from .synthesise import synthesise
 from .view import view
 
 __all__ = ["app"]
@@ -59,6 +60,9 @@ EXAMPLES: dict[Callable[..., None], list[str]] = {
     fibres: ["fibres results/drape", "fibres results/drape --out fibres.vtu"],
     export: ["export results/drape net.vtk"],
     diagnose: ["diagnose my_fabric", "diagnose frame strip --effects crossover_friction"],
+    synthesise: [
+        "synthesise demos/picture_frame.yaml --effect crossover_friction --noise 0.02 --out mine"
+    ],
     doctor: ["doctor"],
 }
 

@@ -118,6 +118,11 @@ def _prepared(
         if same:
             mine = [effect for effect in own if effect.test == test]
             tests.append((experiment_class(test)(same, mine), same))
+    for experiment, _ in tests:
+        known = [effect.name for effect in experiment.effects]
+        for name in known:
+            if known.count(name) > 1:
+                raise InputError(f"{effects_from}: {name}: stands twice, allowed is a new name")
     names = _wanted(effects, tests)
     if effects_from is not None:
         _try_out(effects_from, own, tests)

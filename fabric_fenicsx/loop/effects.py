@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..rigs.keys import one_of
+from .measurement import TESTS
 
 __all__ = ["Effect", "FrameVariant", "Parameter", "StripVariant", "Variant", "read_effects"]
 
@@ -148,4 +150,15 @@ def read_effects(path: Path) -> list[Effect]:
     effects = getattr(module, "EFFECTS", None)
     if not isinstance(effects, (list, tuple)) or not all(isinstance(e, Effect) for e in effects):
         raise InputError(f"{path}: EFFECTS: missing, allowed is a list of loop.effects.Effect")
+    for effect in effects:
+        if effect.test not in TESTS:
+            raise InputError(
+                f"{path}: {effect.name}: test: {effect.test!r}, allowed is {one_of(list(TESTS))}"
+            )
+        for p in (p for variant in effect.variants for p in variant.shapes):
+            if not p.starts:
+                raise InputError(
+                    f"{path}: {effect.name}: {p.name}: no starts, allowed is one or more of them "
+                    "unless it is an amplitude"
+                )
     return list(effects)

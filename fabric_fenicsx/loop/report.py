@@ -27,7 +27,14 @@ __all__ = ["SCHEMA", "combined_report", "headline", "parameter_unit", "test_repo
 
 SCHEMA = "fabric-report/1"
 
-PARAMETER_UNITS = {"N_s_n": "N sⁿ", "rad_s": "rad/s", "rad": "rad", "N_s": "N s", "per_mm": "1/mm"}
+PARAMETER_UNITS = {
+    "N_s_n": "N sⁿ",
+    "1_rad2": "1/rad²",
+    "rad_s": "rad/s",
+    "rad": "rad",
+    "N_s": "N s",
+    "per_mm": "1/mm",
+}
 OTHER_UNITS = {"drift_N_s": "N/s"}
 """A drift's unit is written like a dashpot's."""
 

@@ -1,0 +1,134 @@
+"""From a case to measurements with a hidden effect."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import InputError
+from .collective import collective, from_root
+
+if TYPE_CHECKING:
+    from ..loop.synthesise import Hidden
+    from ..rigs.cases import Case
+
+__all__ = ["synthesise"]
+
+
+def synthesise(
+    case: Annotated[Path, typer.Argument(metavar="CASE.yaml", help="The case of the test.")],
+    noise: Annotated[
+        float, typer.Option("--noise", metavar="X", help="One sigma of a reading [N].")
+    ],
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--effect",
+            metavar="NAME[/FORM][:KEY=X,KEY=X]",
+            help="An effect to hide; strengths that are not given make it clearly visible. "
+            "May be repeated.",
+        ),
+    ] = None,
+    rates: Annotated[
+        str | None,
+        typer.Option(
+            "--rates",
+            metavar="X,X",
+            help="Of the crosshead [mm/min], a run for each, the last one held out; default: the "
+            "case's, ten times and three times that",
+        ),
+    ] = None,
+    readings: Annotated[int, typer.Option("--readings", min=10, help="Of each run.")] = 200,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the noise.")] = 0,
+    effects_from: Annotated[
+        Path | None,
+        typer.Option(
+            "--effects-from", metavar="FILE.py", help="Effects of your own: a list EFFECTS. Is run."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Default: results/measured_ and the case's name"),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Do not say what was put in.")] = False,
+) -> None:
+    """Measure a case in the model, with effects in it that the folder does not tell of.
+
+    For a trial of diagnose, or of a planned test: would these runs show that effect? Exit code 2:
+    bad input, nothing has been written.
+    """
+    folder = out if out is not None else Path("results") / f"measured_{case.stem}"
+
+    def action(comm: Any) -> int:
+        from ..loop.registry import experiment_class
+        from ..rigs.load import load_case
+
+        loaded = from_root(comm, lambda: load_case(case))
+        # On every rank: PETSc starts up in all processes at once.
+        if loaded.test == "picture_frame":
+            experiment_class(loaded.test)
+        put_in = from_root(
+            comm,
+            lambda: _write(
+                case,
+                loaded,
+                folder,
+                effect or [],
+                noise,
+                _numbers(rates),
+                readings,
+                seed,
+                effects_from,
+            ),
+        )
+        if comm.rank == 0 and not quiet:
+            for hidden in put_in:
+                numbers = ", ".join(f"{key} = {x:.6g}" for key, x in hidden.values.items())
+                print(f"{hidden.name}, {hidden.label}: {numbers}")
+            print(folder)
+        return 0
+
+    raise typer.Exit(collective(action))
+
+
+def _write(
+    path: Path,
+    case: Case,
+    folder: Path,
+    effects: list[str],
+    noise: float,
+    rates: list[float],
+    readings: int,
+    seed: int,
+    effects_from: Path | None,
+) -> list[Hidden]:
+    from ..loop import synthesise as loop
+    from ..loop.effects import read_effects
+
+    if not 0.0 < noise < float("inf"):
+        raise InputError(f"--noise: {noise:g}, allowed is more than 0")
+    hidden = [loop.parse_effect(text) for text in effects]
+    own = read_effects(effects_from) if effects_from is not None else []
+    made = loop.synthesise(
+        case, hidden, noise, seed=seed, rates=rates, readings=readings, own=own, place=str(path)
+    )
+    try:
+        loop.write_measurement(folder, made)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror})") from error
+    return made.effects
+
+
+def _numbers(text: str | None) -> list[float]:
+    """The rates of --rates."""
+    found = []
+    for part in text.split(",") if text is not None else []:
+        try:
+            found.append(float(part))
+        except ValueError:
+            found.append(0.0)
+        if not 0.0 < found[-1] < float("inf"):
+            raise InputError(f"--rates: {part.strip()!r}, allowed are numbers more than 0")
+    return found

@@ -1,0 +1,288 @@
+"""Measurements made by the model with an effect in it that the folder does not tell of.
+
+For trials of a diagnosis, and of a planned test: would these runs show that effect?
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import yaml
+
+from ..errors import InputError
+from ..rigs.cases import Case, PictureFrameCase
+from ..rigs.keys import one_of
+from ..rigs.picture_frame import crosshead, duration
+from ..rigs.validation import suggestion
+from .effects import Effect, Variant
+from .experiment import Experiment
+from .fitting import SMALL, orthogonal_to
+from .measurement import (
+    COLUMNS,
+    FILE,
+    QUANTITY,
+    SCHEMA,
+    FabricKeys,
+    MeasuredTowKeys,
+    Measurement,
+    PictureFrameRig,
+    Run,
+)
+from .registry import experiment_class
+
+__all__ = ["Hidden", "Synthetic", "parse_effect", "synthesise", "write_measurement"]
+
+Array = npt.NDArray[np.float64]
+
+#: Root mean square that an effect leaves of the baseline's best imitation, over noise, where its
+#: strength is not given.
+VISIBLE = 10.0
+#: Readings are predicted this many times finer than they are written.
+FINER = 8
+DECIMALS = {"time_s": 6, "displacement_mm": 6}
+
+
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """An effect to be put in.
+
+    Attributes:
+        name: of the effect.
+        label: of its form; empty: the first.
+        values: of its parameters; what is missing is chosen.
+    """
+
+    name: str
+    label: str
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Synthetic:
+    """Measurements that were made up.
+
+    Attributes:
+        content: of measurement.yaml.
+        tables: columns of each CSV, by its name.
+        effects: what was put in: name, label of its form, all its parameters.
+    """
+
+    content: dict[str, Any]
+    tables: dict[str, dict[str, Array]]
+    effects: list[Hidden]
+
+
+def parse_effect(text: str) -> Hidden:
+    """An effect as on the command line, ``NAME[/FORM][:key=value,key=value]``.
+
+    Raises:
+        InputError: it is not written so.
+    """
+    head, _, tail = text.partition(":")
+    name, _, label = head.partition("/")
+    values = {}
+    for part in tail.split(",") if tail else []:
+        key, _, value = part.partition("=")
+        try:
+            values[key.strip()] = float(value)
+        except ValueError:
+            raise InputError(
+                f"--effect: {part!r} in {text!r}, allowed is NAME/FORM:key=number,key=number"
+            ) from None
+    return Hidden(name.strip(), label.strip(), values)
+
+
+def synthesise(
+    case: Case,
+    effects: Sequence[Hidden],
+    noise: float,
+    *,
+    seed: int = 0,
+    rates: Sequence[float] = (),
+    readings: int = 200,
+    own: Sequence[Effect] = (),
+    place: str = "case",
+) -> Synthetic:
+    """Measure a case in the model.
+
+    Args:
+        case: of a picture frame; its shear law is the baseline.
+        effects: to be put in.
+        noise: one sigma of a reading [N], Gaussian.
+        seed: of the noise.
+        rates: of the crosshead [mm/min], a run for each, the last one held out; by default the
+            case's, ten times and three times that.
+        readings: of each run, evenly in time.
+        own: effects of the user's.
+        place: what errors call the case.
+
+    Raises:
+        InputError: an effect, a form or a parameter is not known, or the case cannot be measured.
+    """
+    if not isinstance(case, PictureFrameCase):
+        raise InputError(
+            f"{place}: test: {case.test} cannot be synthesised, allowed is picture_frame"
+        )
+    if case.crossover.laws:
+        raise InputError(
+            f"{place}: crossover.laws: allowed is none of them here, put effects in as --effect"
+        )
+    rates = rates or [factor * case.rate_mm_min for factor in (1.0, 10.0, 3.0)]
+    fabric = _fabric(case)
+    rig = PictureFrameRig(
+        frame_length_mm=case.frame_length_mm, fabric_length_mm=case.fabric_length_mm
+    )
+    fine = _frame_runs(case, rates, (readings - 1) * FINER + 1)
+    measurement = Measurement(Path(), case.test, case.title, fabric, rig, noise, fine)
+    experiment: Experiment = experiment_class(case.test)([measurement], own)
+    baseline = {
+        "k1_N": case.crossover.k1_N_mm,
+        "k3_N": case.crossover.k3_N_mm,
+        "c1_N_s": case.crossover.dashpot_N_s_mm,
+    }
+    forms: list[Variant] = []
+    put_in: list[Hidden] = []
+    values = dict(baseline)
+    for hidden in effects:
+        effect = _named(experiment.effects, hidden.name, "--effect")
+        form = _form(effect, hidden.label)
+        if shared := set(values) & {p.name for p in form.parameters}:
+            raise InputError(f"--effect: {effect.name}: {min(shared)} is another effect's as well")
+        own_values = _strengths(experiment, baseline, form, hidden.values, VISIBLE * noise)
+        forms.append(form)
+        values |= own_values
+        put_in.append(Hidden(effect.name, form.label, own_values))
+    expected, _ = experiment.predict(forms, values)
+    rng = np.random.default_rng(seed)
+    tables = {}
+    for number, run in enumerate(fine):
+        columns = {name: column[::FINER] for name, column in run.columns.items()}
+        own_rows = experiment.readings.run == number
+        exact = expected[own_rows][::FINER]
+        columns[QUANTITY[case.test]] = exact + noise * rng.standard_normal(len(exact))
+        tables[run.file] = columns
+    content = {
+        "schema": SCHEMA,
+        "test": case.test,
+        "title": case.title or case.test.replace("_", " "),
+        "fabric": fabric.model_dump(),
+        "rig": rig.model_dump(),
+        "noise": {QUANTITY[case.test]: noise},
+        "runs": [{"file": r.file, "role": "holdout" if r.holdout else "fit"} for r in fine],
+    }
+    return Synthetic(content, tables, put_in)
+
+
+def write_measurement(folder: Path, synthetic: Synthetic) -> None:
+    """Write the folder that a diagnosis reads.
+
+    Raises:
+        InputError: there is something in it already.
+        OSError: it cannot be written.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder}: exists, allowed is a new or an empty folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, columns in synthetic.tables.items():
+        names = COLUMNS[synthetic.content["test"]]
+        # Three decimals more than the noise.
+        last = max(0, 3 - int(np.floor(np.log10(next(iter(synthetic.content["noise"].values()))))))
+        texts = [[f"{v:.{DECIMALS.get(name, last)}f}" for v in columns[name]] for name in names]
+        lines = [",".join(names), *(",".join(row) for row in zip(*texts, strict=True))]
+        (folder / file).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    text = yaml.safe_dump(synthetic.content, sort_keys=False, allow_unicode=True)
+    (folder / FILE).write_text(text, encoding="utf-8")
+
+
+def _fabric(case: PictureFrameCase) -> FabricKeys:
+    tow = case.tow
+    per_area = 1.0 / case.warp_spacing_mm + 1.0 / case.weft_spacing_mm
+    # kg/mm² to kg/m²
+    density = 1e6 * tow.density_kg_mm3 * tow.width_mm * tow.height_mm * per_area
+    keys = {name: getattr(tow, name) for name in MeasuredTowKeys.model_fields}
+    return FabricKeys(
+        areal_density_kg_m2=round(density, 6),
+        tow_spacing_mm=case.warp_spacing_mm,
+        tow=MeasuredTowKeys(**keys),
+    )
+
+
+def _frame_runs(case: PictureFrameCase, rates: Sequence[float], count: int) -> tuple[Run, ...]:
+    """The crosshead's way in a run for each rate, read evenly in time; no force yet."""
+    runs = []
+    for number, rate in enumerate(rates, start=1):
+        own = case.model_copy(update={"rate_mm_min": rate})
+        time = np.linspace(0.0, duration(own), count)
+        travel = np.array([crosshead(own, t) for t in time])
+        columns = {"time_s": time, "displacement_mm": travel, "force_N": np.zeros(count)}
+        held = 1 < number == len(rates)
+        runs.append(Run(f"run{number}.csv", held, "", columns))
+    return tuple(runs)
+
+
+def _named(effects: Sequence[Effect], name: str, place: str) -> Effect:
+    names = [effect.name for effect in effects]
+    if name not in names:
+        raise InputError(f"{place}: {name!r}{suggestion(name, names)}, allowed is {one_of(names)}")
+    return effects[names.index(name)]
+
+
+def _form(effect: Effect, label: str) -> Variant:
+    labels = [variant.label for variant in effect.variants]
+    if label and label not in labels:
+        raise InputError(
+            f"--effect: {effect.name}/{label}, allowed is {one_of([repr(text) for text in labels])}"
+        )
+    return effect.variants[labels.index(label) if label else 0]
+
+
+def _strengths(
+    experiment: Experiment,
+    baseline: Mapping[str, float],
+    form: Variant,
+    given: Mapping[str, float],
+    target: float,
+) -> dict[str, float]:
+    """All parameters of a form: those given, else in the middle of where a fit would start.
+
+    Amplitudes that are not given leave together the target, as root mean square, of the baseline's
+    best imitation.
+    """
+    names = [p.name for p in form.parameters]
+    for key, value in given.items():
+        if key not in names:
+            raise InputError(
+                f"--effect: {key!r}{suggestion(key, names)}, allowed is {one_of(names)}"
+            )
+        p = form.parameters[names.index(key)]
+        if not p.lower <= value <= p.upper:
+            raise InputError(
+                f"--effect: {key}: {value:g}, allowed is {p.lower:.4g} to {p.upper:.4g}"
+            )
+    values = {p.name: p.starts[len(p.starts) // 2] for p in form.shapes} | dict(given)
+    free = [p for p in form.amplitudes if p.name not in given]
+    if not free:
+        return values
+    without, slopes = experiment.predict((), dict(baseline))
+    J = np.column_stack([slopes[name] for name in baseline])
+
+    def left(change: Array) -> float:
+        return float(np.linalg.norm(orthogonal_to(J, change[:, None]))) / sqrt(len(change))
+
+    at = dict(baseline) | values | {p.name: SMALL for p in free}
+    slopes = experiment.predict((form,), at)[1]
+    for p in free:
+        share = target / sqrt(len(free))
+        values[p.name] = min(max(share / max(left(slopes[p.name]), 1e-300), p.lower), p.upper)
+    for _ in range(4):
+        # What is not linear in its amplitude comes near in a few steps.
+        reached = left(experiment.predict((form,), dict(baseline) | values)[0] - without)
+        for p in free:
+            values[p.name] = min(max(values[p.name] * target / reached, p.lower), p.upper)
+    return values
