@@ -17,7 +17,15 @@ from ..errors import InputError
 from ..rigs.keys import one_of
 from .measurement import TESTS
 
-__all__ = ["Effect", "FrameVariant", "Parameter", "StripVariant", "Variant", "read_effects"]
+__all__ = [
+    "DrapeVariant",
+    "Effect",
+    "FrameVariant",
+    "Parameter",
+    "StripVariant",
+    "Variant",
+    "read_effects",
+]
 
 Values = Mapping[str, Any]
 
@@ -111,6 +119,25 @@ class StripVariant(Variant):
 
     moment: Callable[[Values, Any], Any] | None = None
     slope: Callable[[Values, Any], Any] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DrapeVariant(Variant):
+    """An effect in a drape: other keys of its case, or other places on the sheet.
+
+    Attributes:
+        changes: keys of the case (rigs.cases.DrapeCase) by their dotted names, of the value of the
+            only parameter, an amplitude; it is not asked for at zero, the baseline.
+        solved_at: values of the amplitude at which the drape is solved when it is needed, zero
+            apart; in between it is interpolated. The bounds of the amplitude must not lie outside.
+        places: where the aligned sheet under a centred punch has the tows that are read at x, y
+            [mm], as expressions in UFL of the parameters; the place itself where the amplitudes
+            are zero.
+    """
+
+    changes: Callable[[float], Mapping[str, Any]] | None = None
+    solved_at: tuple[float, ...] = ()
+    places: Callable[[Values, Any, Any], tuple[Any, Any]] | None = None
 
 
 @dataclass(frozen=True, slots=True)

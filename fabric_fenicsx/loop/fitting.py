@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,7 @@ __all__ = [
     "orthogonal_to",
     "parameters_of",
     "signatures",
+    "weighted",
 ]
 
 Array = npt.NDArray[np.float64]
@@ -111,6 +112,8 @@ def fit(
         SolveError: the model has no solution at the start.
     """
     parameters = parameters_of(experiment, variants)
+    if not parameters:
+        return _without_parameters(experiment, variants, used)
     names = [p.name for p in parameters]
     lower, upper = (np.array([getattr(p, end) for p in parameters]) for end in ("lower", "upper"))
     readings = experiment.readings
@@ -171,6 +174,41 @@ def fit(
         weight=readings.weight,
         leverage=np.einsum("ij,jk,ik->i", every, covariance, every),
     )
+
+
+def _without_parameters(
+    experiment: Experiment, variants: Sequence[Variant], used: npt.NDArray[np.bool_]
+) -> Fit:
+    """A model that has nothing to fit."""
+    expected, _ = experiment.predict(variants, {})
+    readings = experiment.readings
+    return Fit(
+        variants=tuple(variants),
+        values={},
+        std={},
+        correlated=(),
+        at_bound=(),
+        residual=readings.observed - expected,
+        expected=expected,
+        used=used,
+        weight=readings.weight,
+        leverage=np.zeros(len(expected)),
+    )
+
+
+def weighted(
+    slopes: Mapping[str, Array], names: Iterable[str], rows: Flags, weight: Array
+) -> Array:
+    """Weighted derivatives in some parameters, (n_rows, n_names); there may be none.
+
+    Args:
+        slopes: by parameter, (n,).
+        names: of the parameters.
+        rows: readings, (n,).
+        weight: of the readings, (n,).
+    """
+    own = [slopes[name][rows] * weight[rows] for name in names]
+    return np.column_stack(own) if own else np.zeros((int(rows.sum()), 0))
 
 
 def without(experiment: Experiment, model: Fit, variants: Sequence[Variant]) -> Fit:

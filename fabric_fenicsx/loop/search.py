@@ -22,7 +22,7 @@ from scipy.stats import chi2
 from ..errors import SolveError
 from .effects import Effect, Variant
 from .experiment import Experiment
-from .fitting import Fit, fit, fit_from_grid, orthogonal_to, signatures, without
+from .fitting import Fit, fit, fit_from_grid, orthogonal_to, signatures, weighted, without
 from .noise import Whiteness, estimated_noise, lone, spikes, whiteness
 
 __all__ = ["Candidate", "Diagnosis", "diagnose_test"]
@@ -214,6 +214,7 @@ class _Search:
             white_before=self._whiteness(baseline),
             white_after=self._whiteness(chosen),
             outliers=self.outliers,
+            notes=list(getattr(self.experiment, "notes", ())),
         )
 
     def _tried(self) -> tuple[list[Candidate], list[Candidate]]:
@@ -231,7 +232,6 @@ class _Search:
     def _scores(self) -> list[Candidate]:
         """Score tests at zero amplitude, corrected for the number of signatures that are tried."""
         rows, base = self.rows, self.baseline
-        weight = base.weight[rows]
         r = (base.residual * base.weight)[rows]
         found: list[tuple[Effect, float, float]] = []
         count = 0
@@ -240,12 +240,10 @@ class _Search:
             best, smallest = 0.0, 1.0
             for variant in effect.variants:
                 for one in signatures(self.experiment, base, variant, amplitudes=False):
-                    columns = one.slopes
                     count += 1
-                    J = np.column_stack([columns[n][rows] * weight for n in base.values])
-                    own = np.column_stack(
-                        [columns[p.name][rows] * weight for p in variant.amplitudes]
-                    )
+                    J = weighted(one.slopes, base.values, rows, base.weight)
+                    amplitudes = [p.name for p in variant.amplitudes]
+                    own = weighted(one.slopes, amplitudes, rows, base.weight)
                     score, p_value = self._score(r, J, own, variant)
                     if p_value < smallest or best == 0.0:
                         best, smallest = max(best, score), min(smallest, p_value)

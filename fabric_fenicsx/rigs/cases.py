@@ -113,6 +113,9 @@ class ContactKeys(Keys):
     stick_stiffness_N_mm2: Positive = Field(
         0.5, description="friction force per tow length and stretch of the stick"
     )
+    frictionless: list[Literal["punch", "die", "holder"]] = Field(
+        [], description="tools without friction, as oiled ones"
+    )
 
 
 class SolverKeys(Keys):

@@ -98,7 +98,11 @@ def symmetry_planes(net: Net) -> list[Support]:
 def contact_law(keys: ContactKeys) -> ContactLaw:
     """Pressure and friction law of the case."""
     return ContactLaw(
-        keys.stiffness_N_mm2, keys.layer_mm, keys.friction, keys.stick_stiffness_N_mm2
+        keys.stiffness_N_mm2,
+        keys.layer_mm,
+        keys.friction,
+        keys.stick_stiffness_N_mm2,
+        tuple(keys.frictionless),
     )
 
 

@@ -295,7 +295,7 @@ class Model:
     def _on_nodes(self, tool: Tool) -> Array:
         """Pressure and friction of a tool on this rank's own nodes, reversed, (n_owned, 3) [N]."""
         force = self.system.term_forces(tool.name)[:, :3]
-        if self.contacts is not None and self.contacts.frictional:
+        if self.contacts is not None and tool.name in self.contacts.frictional:
             force = force + self.system.term_forces(f"{tool.name} friction")[:, :3]
         return force
 

@@ -56,12 +56,18 @@ class ContactLaw:
         layer: penetration over which the stiffness builds up [mm].
         friction: Coulomb's μ [-]; 0 leaves friction out.
         stick_stiffness: friction force per tow length and stretch of the stick [N/mm²].
+        frictionless: names of tools on which there is none, as oiled ones.
     """
 
     stiffness: float
     layer: float
     friction: float = 0.0
     stick_stiffness: float = 0.5
+    frictionless: tuple[str, ...] = ()
+
+    def rubs(self, tool: str) -> bool:
+        """Whether there is friction on a tool."""
+        return self.friction > 0.0 and tool not in self.frictionless
 
 
 class Crossings:
@@ -197,7 +203,7 @@ class Contacts:
             tool follows from balance, its path says where it starts.
 
     Raises:
-        ValueError: a force on a tool that there is not.
+        ValueError: a force on a tool, or one without friction, that there is not.
     """
 
     def __init__(
@@ -208,13 +214,13 @@ class Contacts:
         histories: Histories,
         pressed: Mapping[str, Callable[[float], float]],
     ) -> None:
-        unknown = set(pressed) - {tool.name for tool in tools}
+        unknown = {*pressed, *law.frictionless} - {tool.name for tool in tools}
         if unknown:
             raise ValueError(f"no tool is called {', '.join(sorted(unknown))}")
         self.tools = list(tools)
         self.pressed: dict[str, PressedTool] = {}
         self.terms: list[Term] = []
-        self.frictional = law.friction > 0.0
+        self.frictional = {tool.name for tool in tools if law.rubs(tool.name)}
         self._places: list[Any] = []
         self._shifts: list[Any] = []
         self._samples: list[tuple[SampledTool, Any, Function]] = []
@@ -244,7 +250,7 @@ class Contacts:
             energy = contact.contact_energy(tows, distance, *pressure)
             self.terms.append(energy_term(tool.name, tows, energy))
             traction = None
-            if self.frictional:
+            if tool.name in self.frictional:
                 traction_n = Function(tows.u_n.function_space)
                 traction = contact.friction_traction(
                     tows, distance, pressure, friction, traction_n, shift
