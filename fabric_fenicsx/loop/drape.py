@@ -24,9 +24,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, RegularGridInterpolator
 from scipy.ndimage import gaussian_filter
 
+from ..rigs.cases import DrapeCase
 from .drape_effects import DRAPE_EFFECTS
 from .effects import DrapeVariant, Effect, Parameter, Variant
 from .experiment import Readings
@@ -95,10 +96,15 @@ class Drape:
             shear: law of the crossings; None for that of the demo.
             C1: Neo-Hookean constant of the tows [MPa]; None for each measurement's own.
             source: where these come from, for the report.
+
+        Raises:
+            InputError: there is no drape of such a rig, law or C1.
         """
         self._shear, self._C1, self._source = shear or ShearLaw(), C1, source
         self._shear_source = source if shear is not None else "assumed, as in demos/drape.yaml"
         self._C1_source = source if C1 is not None else "of the measurement's tows"
+        for m in self.measurements:
+            self._case(m, {})
 
     # Data ---------------------------------------------------------------------------------
 
@@ -189,8 +195,9 @@ class Drape:
             off = [np.degrees(np.abs(f.gamma) - np.abs(mean)) for f in raw]
             square = gaussian_filter(np.mean(np.square(off), axis=0), 1.0, mode="nearest")
             # Linear between crossings: a square must not overshoot below zero.
-            smooth = ShearField(raw[0].x, raw[0].y, square, order=1)
-            scatter[sheet.rows] = np.sqrt(smooth.at(sheet.x, sheet.y)[0])
+            x, y = raw[0].x, raw[0].y
+            places = np.column_stack([np.clip(sheet.x, x[0], x[-1]), np.clip(sheet.y, y[0], y[-1])])
+            scatter[sheet.rows] = np.sqrt(RegularGridInterpolator((x, y), square)(places))
         return scatter
 
     @property
@@ -238,7 +245,7 @@ class Drape:
                 slope = changed.get(name, np.zeros_like(gamma))
                 for axis, gradient in (("x", along_x), ("y", along_y)):
                     if name in at[axis].slopes:
-                        slope = slope + gradient * at[axis].slopes[name][0]
+                        slope = slope + gradient * np.ravel(at[axis].slopes[name])
                 slopes[name][sheet.rows] = to_angle * slope
         return expected, slopes
 
@@ -290,12 +297,15 @@ class Drape:
 
     def _raw(self, m: Measurement, changes: Mapping[str, Any]) -> ShearField:
         """The field of a changed case, solved once."""
-        C1 = m.fabric.tow.C1_MPa if self._C1 is None else self._C1
-        case = drape_case(m, self._shear, C1, {"sheet.subdivisions": MESH, **changes})
+        case = self._case(m, changes)
         key = case.model_dump_json()
         if key not in self._fields:
             self._fields[key] = self._solve(case)
         return self._fields[key]
+
+    def _case(self, m: Measurement, changes: Mapping[str, Any]) -> DrapeCase:
+        C1 = m.fabric.tow.C1_MPa if self._C1 is None else self._C1
+        return drape_case(m, self._shear, C1, {"sheet.subdivisions": MESH, **changes})
 
 
 def hermite_weights(

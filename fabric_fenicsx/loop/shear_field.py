@@ -21,7 +21,7 @@ from ..rigs.cases import DrapeCase
 from ..rigs.common import Session, control
 from ..rigs.drape import build
 from ..solving.simulation import simulate
-from .measurement import Measurement
+from .measurement import FILE, Measurement
 
 __all__ = ["ShearField", "ShearLaw", "Solve", "drape_case", "solved_field"]
 
@@ -49,15 +49,13 @@ class ShearField:
     """Signed shear angle over a flat sheet, bicubic between crossings, constant beyond the outer.
 
     Args:
-        x, y: of the crossings [mm], increasing, (n,) and (m,).
+        x, y: of the crossings [mm], increasing, (n,) and (m,), four or more.
         gamma: signed shear angle there [rad], (n, m).
-        order: of the spline.
     """
 
-    def __init__(self, x: Array, y: Array, gamma: Array, order: int = 3) -> None:
+    def __init__(self, x: Array, y: Array, gamma: Array) -> None:
         self.x, self.y, self.gamma = x, y, gamma
-        orders = (min(order, len(x) - 1), min(order, len(y) - 1))
-        self._spline = RectBivariateSpline(x, y, gamma, kx=orders[0], ky=orders[1])
+        self._spline = RectBivariateSpline(x, y, gamma)
 
     @classmethod
     def of_quarter(cls, places: Array, gamma: Array) -> ShearField:
@@ -125,6 +123,11 @@ def drape_case(
     """
     rig, fabric = measurement.rig, measurement.fabric
     s, a, b = fabric.tow_spacing_mm, fabric.tow.width_mm, fabric.tow.height_mm
+    if rig.fabric_size_mm < 4.0 * s:
+        raise InputError(
+            f"{measurement.folder / FILE}: rig.fabric_size_mm: {rig.fabric_size_mm:g}, "
+            f"allowed is four times tow_spacing_mm or more, {4.0 * s:g}"
+        )
     keys: dict[str, Any] = {
         "test": "drape",
         "sheet": {
@@ -155,7 +158,7 @@ def drape_case(
     except ValidationError as error:
         first = error.errors()[0]
         name = ".".join(map(str, first["loc"]))
-        raise InputError(f"{measurement.folder}: {name}: {first['msg']} in a drape") from error
+        raise InputError(f"{measurement.folder / FILE}: {name}: {first['msg']}") from error
 
 
 def solved_field(case: DrapeCase) -> ShearField:
