@@ -57,7 +57,7 @@ DRAPE_EFFECTS = (
                 (
                     Parameter(
                         "holder_force_N",
-                        (20.0,),
+                        (50.0, 200.0),
                         0.0,
                         500.0,
                         amplitude=True,
@@ -69,7 +69,7 @@ DRAPE_EFFECTS = (
                     "contact.friction": HOLDER_FRICTION,
                     "contact.frictionless": ["punch"],
                 },
-                solved_at=(20.0, 60.0, 200.0, 500.0),
+                solved_at=(50.0, 200.0, 500.0),
             ),
         ),
     ),

@@ -1,0 +1,268 @@
+"""Drapes traced to effects: a smooth field in place of the finite elements, and, slow, with them."""
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+import yaml
+
+from fabric_fenicsx.errors import InputError
+from fabric_fenicsx.loop.drape import OTHER_MESH, Drape, hermite_weights
+from fabric_fenicsx.loop.drape_effects import DRAPE_EFFECTS
+from fabric_fenicsx.loop.fitting import fit
+from fabric_fenicsx.loop.measurement import read_measurement
+from fabric_fenicsx.loop.report import test_report as report_of
+from fabric_fenicsx.loop.search import diagnose_test
+from fabric_fenicsx.loop.shear_field import ShearField, ShearLaw, drape_case
+from fabric_fenicsx.rigs.cases import DrapeCase
+from fabric_fenicsx.rigs.common import Session
+from fabric_fenicsx.rigs.drape import build
+from fabric_fenicsx.solving.parts import ContactLaw
+
+RIG = {
+    "punch_radius_mm": 76.2,
+    "hole_radius_mm": 80,
+    "punch_travel_mm": 65,
+    "fabric_size_mm": 288,
+    "duration_s": 60,
+}
+SIDE = np.arange(-138.0, 139.0, 12.0)
+FORMS = {effect.name: effect.variants[0] for effect in DRAPE_EFFECTS}
+
+
+def shear(x, y, mu=0.0, force=0.0):
+    """A made-up shear angle [rad], odd in x and in y; friction brings it closer to the middle."""
+    width = 90.0 - 25.0 * mu / (0.2 + mu) - 20.0 * force / (100.0 + force)
+    return 1.8 * x * y / width**2 * np.exp(-(x**2 + y**2) / width**2)
+
+
+def made_up(case):
+    """In place of the finite elements: cases differ by their friction and by a ripple."""
+    force = case.holder_force_N or 0.0
+    gamma = shear(*np.meshgrid(SIDE, SIDE, indexing="ij"), case.contact.friction, force)
+    ripple = 0.01 * np.sin(np.outer(SIDE, SIDE) / 900.0)
+    return ShearField(SIDE, SIDE, gamma + ripple * (case.sheet.subdivisions == OTHER_MESH))
+
+
+def angle(x, y, **changes):
+    return 90.0 - np.degrees(np.abs(shear(x, y, **changes)))
+
+
+def turned(x, y, degrees):
+    phi = np.radians(degrees)
+    return np.cos(phi) * x + np.sin(phi) * y, np.cos(phi) * y - np.sin(phi) * x
+
+
+def marks(count=60, reach=125.0, seed=3):
+    return np.random.default_rng(seed).uniform(-reach, reach, (2, count))
+
+
+def written(folder, x, y, angles, *, noise=1.0, std=None, rig=RIG, held=0):
+    """A measurement's folder; the last ``held`` readings are held out."""
+    columns = {"x_mm": x, "y_mm": y, "angle_deg": angles} | (
+        {} if std is None else {"std_deg": std}
+    )
+    table = np.column_stack(list(columns.values()))
+    parts = {"fit": table[: len(x) - held], "holdout": table[len(x) - held :]}
+    runs = []
+    for role, rows in parts.items():
+        if len(rows):
+            header = ",".join(columns)
+            np.savetxt(folder / f"{role}.csv", rows, "%.9g", ",", header=header, comments="")
+            runs.append({"file": f"{role}.csv", "role": role})
+    keys = {
+        "schema": "fabric-measurement/1",
+        "test": "drape",
+        "fabric": {"areal_density_kg_m2": 0.21894, "tow_spacing_mm": 12},
+        "rig": rig,
+        "runs": runs,
+    }
+    keys |= {} if noise is None else {"noise": {"angle_deg": noise}}
+    (folder / "measurement.yaml").write_text(yaml.safe_dump(keys))
+    return read_measurement(folder)
+
+
+def draped(folder, x, y, angles, **options):
+    return Drape([written(folder, x, y, angles, **options)], solve=made_up)
+
+
+def test_the_filter_takes_waves_of_two_spacings_and_leaves_cubics():
+    x, y = np.meshgrid(SIDE, SIDE, indexing="ij")
+    cubic = 1e-6 * (x**3 - 2.0 * x * y**2) + 1e-3 * y
+    waves = 0.1 * np.where(np.add.outer(np.arange(24), np.arange(24)) % 2, 1.0, -1.0)
+    filtered = ShearField(SIDE, SIDE, cubic + waves).filtered().gamma
+    inside = (slice(2, -2), slice(2, -2))
+    assert filtered[inside] == pytest.approx(cubic[inside], abs=1e-12)
+    four = ShearField(SIDE, SIDE, np.sin(np.pi / 2 * np.arange(24))[:, None] * np.ones(24))
+    assert four.filtered().gamma[inside] == pytest.approx(0.75 * four.gamma[inside], abs=1e-12)
+
+
+def test_a_quarter_is_mirrored_with_changes_of_sign():
+    places = np.array([(x, y) for y in SIDE[12:] for x in SIDE[12:]])
+    field = ShearField.of_quarter(places, shear(*places.T))
+    x, y = marks()
+    gamma, along_x, along_y = field.at(x, y)
+    # A spline of third order on 12 mm.
+    assert gamma == pytest.approx(shear(x, y), abs=2e-4)
+    h = 1e-5
+    assert along_x == pytest.approx(
+        (field.at(x + h, y)[0] - field.at(x - h, y)[0]) / 2 / h, abs=1e-8
+    )
+    assert along_y == pytest.approx(
+        (field.at(x, y + h)[0] - field.at(x, y - h)[0]) / 2 / h, abs=1e-8
+    )
+
+
+def test_beyond_the_outer_crossings_the_field_is_constant():
+    field = made_up(DrapeCase(test="drape"))
+    gamma, along_x, along_y = field.at(np.array([150.0, 138.0]), np.array([40.0, 40.0]))
+    assert gamma[0] == gamma[1]
+    assert along_x[0] == 0.0
+    assert along_y[0] == along_y[1] != 0.0
+
+
+@pytest.mark.parametrize("value", [0.0, 0.07, 0.1, 0.15, 0.33, 0.8])
+def test_interpolation_between_amplitudes_is_smooth_and_exact_for_quadratics(value):
+    solved_at = (0.1, 0.2, 0.4, 0.8)
+    nodes, weights, slopes = map(np.array, hermite_weights(solved_at, value))
+    assert weights @ (1.0 + 3.0 * nodes - 5.0 * nodes**2) == pytest.approx(
+        1.0 + 3.0 * value - 5.0 * value**2
+    )
+    assert slopes @ (1.0 + 3.0 * nodes - 5.0 * nodes**2) == pytest.approx(3.0 - 10.0 * value)
+    if 0.0 < value < 0.8:
+        before, after = (
+            dict(zip(*hermite_weights(solved_at, value + d)[::2], strict=True))
+            for d in (-1e-9, 1e-9)
+        )
+        for node in before.keys() | after.keys():
+            assert before.get(node, 0.0) == pytest.approx(after.get(node, 0.0), abs=1e-6)
+
+
+def test_an_interval_asks_for_its_ends_and_their_neighbours_only():
+    assert hermite_weights((0.1, 0.2, 0.4, 0.8), 1e-9)[0] == [0.0, 0.1, 0.2]
+    assert hermite_weights((0.1, 0.2, 0.4, 0.8), 0.25)[0] == [0.1, 0.2, 0.4, 0.8]
+    assert hermite_weights((-1.0, 2.0), 5.0)[0] == [-1.0, 0.0, 2.0]
+
+
+def test_derivatives_in_all_parameters_together(tmp_path):
+    x, y = marks()
+    drape = draped(tmp_path, x, y, angle(x, y))
+    values = {"mu": 0.13, "holder_force_N": 70.0, "dx_mm": 5.0, "dy_mm": -3.0, "rotation_deg": 6.0}
+    variants = tuple(FORMS.values())
+    _, slopes = drape.predict(variants, values)
+    for name, value in values.items():
+        h = 1e-6 * abs(value)
+        up, down = (drape.predict(variants, values | {name: value + d})[0] for d in (h, -h))
+        assert slopes[name] == pytest.approx((up - down) / (2.0 * h), rel=1e-5, abs=1e-6)
+
+
+def test_offset_and_rotation_move_the_pattern(tmp_path):
+    x, y = marks(reach=100.0)
+    drape = draped(tmp_path, x, y, angle(x, y))
+    values = {"dx_mm": 6.0, "dy_mm": -4.0, "rotation_deg": 5.0}
+    moves = (FORMS["punch_offset"], FORMS["ply_rotation"])
+    expected, _ = drape.predict(moves, values)
+    # The field is filtered and interpolated: by a tenth of a degree it is another.
+    assert expected == pytest.approx(angle(*turned(x - 6.0, y + 4.0, 5.0)), abs=0.15)
+    other_order, _ = drape.predict(moves[::-1], values)
+    assert (other_order == expected).all()
+
+
+HIDDEN = {
+    "punch_offset": (lambda x, y: angle(x - 6.0, y + 4.0), {"dx_mm": 6.0, "dy_mm": -4.0}),
+    "ply_rotation": (lambda x, y: angle(*turned(x, y, 4.0)), {"rotation_deg": 4.0}),
+    "tool_friction": (lambda x, y: angle(x, y, mu=0.3), {"mu": 0.3}),
+}
+
+
+@pytest.mark.parametrize("name", HIDDEN)
+def test_a_hidden_effect_is_named_with_its_size(tmp_path, name):
+    truth, parameters = HIDDEN[name]
+    x, y = marks()
+    angles = truth(x, y) + np.random.default_rng(1).normal(0.0, 1.0, len(x))
+    drape = draped(tmp_path, x, y, angles, held=15)
+    diagnosis = diagnose_test(drape)
+    report = report_of(diagnosis, drape.measurements)
+    assert report["verdict"] == "effect_found"
+    effect = report["effects"][0]
+    assert [e["name"] for e in report["effects"]] == [name]
+    for key, value in parameters.items():
+        assert abs(effect["parameters"][key] - value) < 4.0 * effect["std"][key]
+        assert abs(effect["parameters"][key] - value) < 0.5 * abs(value)
+    assert report["error"]["after"]["holdout"] < 1.3 < report["error"]["before"]["holdout"]
+    assert len(report["notes"]) == 3
+    assert "assumed" in report["notes"][0]
+
+
+def test_without_an_effect_the_baseline_explains_the_data(tmp_path):
+    x, y = marks()
+    angles = angle(x, y) + np.random.default_rng(2).normal(0.0, 1.0, len(x))
+    drape = draped(tmp_path, x, y, angles)
+    diagnosis = diagnose_test(drape)
+    assert diagnosis.verdict == "no_effect"
+    assert diagnosis.baseline.values == {}
+    assert diagnosis.baseline.residual == pytest.approx(angles - angle(x, y), abs=0.15)
+
+
+def test_a_model_without_parameters_has_nothing_to_fit(tmp_path):
+    x, y = marks()
+    drape = draped(tmp_path, x, y, angle(x, y))
+    model = fit(drape, (), {}, drape.readings.fit)
+    assert model.values == model.std == {}
+    assert model.freedom == len(x)
+    assert (model.leverage == 0.0).all()
+
+
+def test_readings_are_weighed_by_their_sigma_and_the_models_own_scatter(tmp_path):
+    x, y = marks()
+    std = np.where(x > 0.0, 2.0, 0.5)
+    drape = draped(tmp_path, x, y, angle(x, y), noise=None, std=std)
+    assert drape.noise == pytest.approx(np.sqrt(np.mean(std**2)))
+    scatter = drape.model_scatter
+    assert drape.readings.weight == pytest.approx(drape.noise / np.sqrt(std**2 + scatter**2))
+    # Half the mean square of a ripple of 0.01 rad at most.
+    assert 0.0 < scatter.min() < scatter.max() < np.degrees(0.01)
+
+
+def test_obtuse_angles_are_made_acute_all_or_none(tmp_path):
+    x, y = marks()
+    signed = np.where(x * y > 0.0, angle(x, y), 180.0 - angle(x, y))
+    assert signed.max() > 100.0
+    drape = draped(tmp_path, x, y, signed)
+    assert drape.readings.observed == pytest.approx(angle(x, y), abs=1e-6)
+    near = np.minimum(angle(x, y) + 3.0, 95.0)
+    assert draped(tmp_path, x, y, near).readings.observed == pytest.approx(near, abs=1e-6)
+
+
+def test_the_case_weighs_what_the_fabric_does(tmp_path):
+    measurement = written(tmp_path, *marks(), 80.0 * np.ones(60))
+    case = drape_case(measurement, ShearLaw(0.01, 0.05, 1.0), 30000.0, {"contact.friction": 0.3})
+    tow = case.tow
+    per_area = 2.0 * tow.width_mm * tow.height_mm * tow.density_kg_mm3 / 12.0
+    assert per_area * 1e6 == pytest.approx(0.21894)
+    assert (case.crossover.k1_N_mm, case.crossover.k3_N_mm) == (0.01, 0.05)
+    assert case.crossover.dashpot_N_s_mm == 1.0
+    assert (tow.C1_MPa, case.contact.friction, case.symmetry) == (30000.0, 0.3, "quarter")
+
+
+def test_what_cannot_be_draped_is_told_with_its_key(tmp_path):
+    x, y = np.zeros((2, 1))
+    small = written(tmp_path, x, y, x + 80.0, rig=RIG | {"fabric_size_mm": 40})
+    with pytest.raises(InputError, match=r"fabric_size_mm: 40, allowed is .* 48"):
+        Drape([small])
+    drape = draped(tmp_path, x, y, x + 80.0)
+    with pytest.raises(InputError, match=r"k1_N_mm.*greater than or equal to 0"):
+        drape.use(ShearLaw(k1=-0.01), None, "picture frame")
+
+
+def test_a_tool_without_friction_does_not_rub():
+    case = DrapeCase(
+        test="drape",
+        sheet={"width_mm": 96, "length_mm": 96, "warp_spacing_mm": 24, "weft_spacing_mm": 24},
+        contact={"friction": 0.2, "frictionless": ["punch"]},
+    )
+    model = build(case, Session(None, MPI.COMM_SELF, None, 0.0))
+    assert model.contacts.frictional == {"die", "holder"}
+    names = {term.name for term in model.contacts.terms}
+    assert names == {"punch", "die", "die friction", "holder", "holder friction"}
+    assert not ContactLaw(0.5, 0.5).rubs("die")
