@@ -1,4 +1,4 @@
-"""Drapes traced to effects: a smooth field in place of the finite elements, and, slow, with them."""
+"""Drapes traced to effects: a smooth field in place of finite elements, and, slow, with them."""
 
 from mpi4py import MPI
 
