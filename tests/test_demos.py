@@ -42,6 +42,18 @@ def test_picture_frame_carries_the_crossings_moment(tmp_path):
     assert 1e-3 < deviations["viscous"] < 8e-3
 
 
+def test_the_loop_is_closed(tmp_path):
+    """The friction that was hidden is named, inside three standard errors of what was put in."""
+    loop = demo("close_the_loop")
+    report = loop.main(tmp_path)
+    (effect,) = report["effects"]
+    assert (effect["name"], effect["variant"]) == (loop.HIDDEN.name, loop.HIDDEN.label)
+    for key, value in loop.HIDDEN.values.items():
+        assert abs(effect["parameters"][key] - value) < 3.0 * effect["std"][key]
+    assert report["error"]["after"]["holdout"] < 1.15 * loop.NOISE
+    assert (tmp_path / "close_the_loop.png").stat().st_size > 10_000
+
+
 def test_drape_starts(tmp_path):
     """The first 6 mm of the draw: the apex follows the punch, the picture is drawn."""
     numbers = demo("drape").main(tmp_path, duration=5.5)

@@ -1,6 +1,7 @@
 """Measurements made up by the model: what is in them is found again, and not told by the folder."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -151,3 +152,10 @@ def test_strengths_that_are_not_given_are_visible(tmp_path, capsys):
     assert command("diagnose", tmp_path / "made", "--out", tmp_path / "out", *arguments) == 0
     error = json.loads((tmp_path / "out/report.json").read_text())["error"]
     assert 5.0 < error["before"]["fit"] / 0.02 < 20.0
+
+
+def test_the_page_on_effects_shows_the_demo():
+    """What stands on the page is in the file word by word."""
+    page, text = (DEMOS.parent / "docs/effects.md").read_text(), OWN.read_text()
+    shown = re.findall(r"```python\n(.*?)```", page, re.S)
+    assert len(shown) == 2 and all(block in text for block in shown)

@@ -251,7 +251,7 @@ def _left_out(d: Diagnosis, measurements: Sequence[Measurement]) -> dict[str, An
         count = int((~readings.usable[own]).sum())
         if count:
             unknown.append(place | {"readings": count, "of": len(own)})
-    return {"outliers": outliers, "rate_unknown": unknown}
+    return {"outliers": outliers, "not_comparable": unknown}
 
 
 def _finite(value: Any) -> Any:
