@@ -32,7 +32,7 @@ export PYTHONNOUSERSITE := 1
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 
 .DEFAULT_GOAL := help
-.PHONY: help setup drape test test-slow check reference bench image clean
+.PHONY: help setup drape test test-slow check reference docs bench image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 12
@@ -69,6 +69,11 @@ reference: setup ## compute the table of verified numbers anew, docs/reference.m
 
 bench: setup ## time the benchmark problems against other solvers (PEERS=a file, see the script)
 	$(VENV)/python tests/benchmarks/side_by_side.py $(PEERS)
+docs: setup ## build the pages into build/docs, with their pictures
+	$(VENV)/python -c 'import mkdocs' 2>/dev/null || $(VENV)/python -m pip install --quiet --editable '.[docs]'
+	$(VENV)/python scripts/gallery.py
+	$(VENV)/mkdocs build --quiet
+	@echo build/docs/index.html
 
 image: ## build the container image fabric-fenicsx
 	$(DOCKER) build -t fabric-fenicsx .

@@ -26,6 +26,7 @@ from scipy.integrate import solve_bvp, trapezoid
 from fabric_fenicsx.rigs import cantilever
 from fabric_fenicsx.rigs.cases import CantileverCase
 from fabric_fenicsx.rigs.common import Session, section
+from fabric_fenicsx.rigs.fabrics import strip
 from fabric_fenicsx.solving.record import prepare_folder
 
 
@@ -66,7 +67,7 @@ def main(folder: Path = Path("results/demo_cantilever")) -> dict[float, tuple[fl
     tow = section(case.tow)
     drops = {}
     for length, own in shape.groupby("length_mm"):
-        sheet = cantilever.strip(case, float(length))
+        sheet = strip(case, float(length))
         hanging, crossing = len(sheet.weft_positions), len(sheet.warp_positions)
         tows_length = hanging * length + crossing * case.width_mm
         weight = tow.density * tow.area * tows_length * case.gravity_mm_s2 / length

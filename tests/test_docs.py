@@ -1,0 +1,122 @@
+"""Every command of the pages runs, in the order of its page; links and pictures are there.
+
+A page is prose. Its ```console blocks are commands, those after `<!-- slow -->` for the slow tests;
+a block with `file=NAME` is a file that they use.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+BUILT = {"gallery", "keys.md"}
+"""What `make docs` writes."""
+
+LATER = {"effects.md", "performance.md"}
+"""Pages that have a place in the menu and may not be there yet."""
+
+BLOCK = re.compile(r"(<!-- slow -->\n)?```(\w+)(?: file=(\S+))?\n(.*?)```", re.S)
+
+COMMAND = re.compile(r"^\$ (.*)$", re.M)
+
+
+def blocks(page):
+    """(slow, kind, file, text) of each block of a page."""
+    for slow, kind, file, text in BLOCK.findall(page.read_text(encoding="utf-8")):
+        yield bool(slow), kind, file, text
+
+
+def with_commands(slow):
+    pages = [*sorted(DOCS.glob("*.md")), ROOT / "README.md"]
+    chosen = [p for p in pages if any(s == slow and k == "console" for s, k, _, _ in blocks(p))]
+    return [pytest.param(page, id=page.stem) for page in chosen]
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder like the repository's, with the first steps of a drape in results/drape."""
+    folder = tmp_path_factory.mktemp("docs")
+    for name in ("demos", "meshes"):
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "bin").mkdir()
+    for name, command in (
+        ("fabric-fenicsx", f"{sys.executable} -m fabric_fenicsx"),
+        ("python", sys.executable),
+    ):
+        script = folder / "bin" / name
+        script.write_text(f'#!/bin/sh\nexec {command} "$@"\n')
+        script.chmod(0o755)
+    short = ["--set", "punch_travel_mm=3", "--set", "duration_s=3", "--no-pictures"]
+    shell(folder, " ".join(["fabric-fenicsx run demos/drape.yaml --out results/drape", *short]))
+    return folder
+
+
+def shell(folder, line):
+    env = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    env["PATH"] = f"{folder / 'bin'}:{env['PATH']}"
+    env["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), env.get("PYTHONPATH")]))
+    done = subprocess.run(
+        line, shell=True, cwd=folder, env=env, capture_output=True, text=True, timeout=900
+    )
+    assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    return done.stdout
+
+
+def run_page(folder, page, slow):
+    count = 0
+    for is_slow, kind, file, text in blocks(page):
+        if file:
+            (folder / file).write_text(text, encoding="utf-8")
+        # Slow ones go on from what the others of their page have left.
+        if kind == "console" and (slow or not is_slow):
+            for line in COMMAND.findall(text):
+                shell(folder, line)
+                count += 1
+    assert count > 0
+
+
+@pytest.mark.parametrize("page", with_commands(slow=False))
+def test_commands_of_a_page(place, page):
+    run_page(place, page, slow=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", with_commands(slow=True))
+def test_all_commands_of_a_page(place, page):
+    (place / "mine.yaml").unlink(missing_ok=True)
+    run_page(place, page, slow=True)
+
+
+def test_blocks_are_marked_as_what_they_are():
+    """No command hides in a block of another kind, and each console block has one."""
+    for page in DOCS.glob("*.md"):
+        for _, kind, _, text in blocks(page):
+            assert bool(COMMAND.search(text)) == (kind == "console"), (page, text)
+
+
+def test_links_lead_somewhere():
+    for page in DOCS.glob("*.md"):
+        for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
+            if not target.startswith("http") and target.split("/")[0] not in BUILT | LATER:
+                assert (DOCS / target).exists(), (page.name, target)
+
+
+def test_every_page_is_in_the_menu():
+    menu = yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"]
+
+    def files(entries):
+        for entry in entries:
+            for value in entry.values():
+                yield from files(value) if isinstance(value, list) else [value]
+
+    listed = set(files(menu))
+    assert {page.name for page in DOCS.glob("*.md")} <= listed | BUILT
+    assert listed <= {page.name for page in DOCS.glob("*.md")} | BUILT | LATER
