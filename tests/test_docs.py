@@ -1,7 +1,7 @@
 """Every command of the pages runs, in the order of its page; links and pictures are there.
 
 A page is prose. Its ```console blocks are commands, those after `<!-- slow -->` for the slow tests;
-a block with `file=NAME` is a file that they use.
+one after `<!-- file: NAME -->` is a file that they use.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ BUILT = {"gallery", "keys.md"}
 LATER = {"effects.md", "performance.md"}
 """Pages that have a place in the menu and may not be there yet."""
 
-BLOCK = re.compile(r"(<!-- slow -->\n)?```(\w+)(?: file=(\S+))?\n(.*?)```", re.S)
+BLOCK = re.compile(r"(<!-- slow -->\n)?(?:<!-- file: (\S+) -->\n)?```(\w+)\n(.*?)```", re.S)
 
 COMMAND = re.compile(r"^\$ (.*)$", re.M)
 
 
 def blocks(page):
     """(slow, kind, file, text) of each block of a page."""
-    for slow, kind, file, text in BLOCK.findall(page.read_text(encoding="utf-8")):
+    for slow, file, kind, text in BLOCK.findall(page.read_text(encoding="utf-8")):
         yield bool(slow), kind, file, text
 
 
