@@ -69,6 +69,7 @@ reference: setup ## compute the table of verified numbers anew, docs/reference.m
 
 bench: setup ## time the benchmark problems against other solvers (PEERS=a file, see the script)
 	$(VENV)/python tests/benchmarks/side_by_side.py $(PEERS)
+
 docs: setup ## build the pages into build/docs, with their pictures
 	$(VENV)/python -c 'import mkdocs' 2>/dev/null || $(VENV)/python -m pip install --quiet --editable '.[docs]'
 	$(VENV)/python scripts/gallery.py
