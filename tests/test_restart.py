@@ -1,0 +1,85 @@
+"""A run that goes on from a step file, on another number of ranks than it began on."""
+
+import shutil
+from pathlib import Path
+from time import perf_counter
+
+from mpi4py import MPI
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from fabric_fenicsx.rigs import drape
+from fabric_fenicsx.rigs.cases import DrapeCase
+from fabric_fenicsx.rigs.common import Session
+
+# Everything that remembers: friction on the tools, the height of a pushed holder, a Maxwell branch,
+# friction and slip at the crossings, the viscosity of bending.
+CASE = {
+    "test": "drape",
+    "sheet": {"width_mm": 144, "length_mm": 144},
+    "punch_radius_mm": 30,
+    "hole_radius_mm": 34,
+    "edge_radius_mm": 8,
+    "punch_travel_mm": 18,
+    "duration_s": 18,
+    "holder_force_N": 60,
+    "contact": {"friction": 0.2},
+    "crossover": {
+        "slip_limit_N": 0.5,
+        "laws": [
+            {"law": "maxwell", "k_N_mm": 0.05, "relaxation_time_s": 5},
+            {"law": "coulomb_friction", "limit_N_mm": 0.002},
+        ],
+    },
+    "solver": {"force_tolerance_N": 1e-7, "iteration_limit": 25},
+}
+MEMORIES = {"Maxwell branch", "Coulomb friction", "slip along", "traction", "height"}
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+def test_resume_on_another_number_of_ranks(tmp_path):
+    """Begun on one rank, gone on with on all: the end of the run on one rank.
+
+    Under mpirun on two. A residual of 1e-7 N moves a node of the flange, held by friction and
+    springs of some 0.1 N/mm, by 1e-6 mm; snaps multiply that.
+    """
+    world = MPI.COMM_WORLD
+    whole = Path(world.bcast(str(tmp_path)))
+    again = whole / "again"
+    case = DrapeCase.model_validate(CASE)
+
+    def run(comm, folder, *, resume=False):
+        session = Session(folder, comm, Path(), perf_counter(), resume=resume, pictures=False)
+        assert drape.run(case, session)["completed"]
+
+    if world.rank == 0:
+        run(MPI.COMM_SELF, whole)
+        shutil.copytree(whole / "steps", again / "steps")
+        shutil.copytree(whole / "paraview", again / "paraview")
+        shutil.copy(whole / "steps.csv", again)
+        files = sorted((again / "steps").glob("*.npz"))
+        with np.load(files[len(files) // 2]) as middle:
+            for memory in MEMORIES:
+                names = [name for name in middle.files if memory in name]
+                assert names and all(np.abs(middle[name]).max() > 0.0 for name in names), memory
+        for file in files[len(files) // 2 + 1 :]:
+            file.unlink()
+    world.barrier()
+    run(world, again, resume=True)
+    if world.rank == 0:
+        ends = [sorted((folder / "steps").glob("*.npz"))[-1] for folder in (whole, again)]
+        one, other = (dict(np.load(file)) for file in ends)
+        assert one.keys() == other.keys()
+        assert one["number"] == other["number"]
+        numbers = [name for name in one if one[name].dtype.kind == "f"]
+        for name in numbers:
+            scale = np.abs(one[name]).max()
+            print(name, np.abs(one[name]-other[name]).max()/max(scale,1e-300))
+        tables = [pd.read_csv(folder / "crossings.csv") for folder in (whole, again)]
+        assert tables[1].to_numpy() == pytest.approx(tables[0].to_numpy(), abs=1e-4)
+        sums = [pd.read_csv(folder / "steps.csv").iloc[-1] for folder in (whole, again)]
+        for name in ("external_work_N_mm", "lost_N_mm", "stored_N_mm", "holder_height_mm"):
+            assert sums[1][name] == pytest.approx(sums[0][name], rel=1e-5)
