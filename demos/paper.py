@@ -58,6 +58,8 @@ PAPER = {
 # %%
 SHEETS = {12: 288, 11: 286, 10: 290}  # mm
 FRICTIONS = (0.0, 0.1)
+# A holder that stretches the tows, beside the paper's oiled one: force [N] and friction.
+PRESSED = ((1000.0, 0.0), (1000.0, 0.3))
 
 
 def rms(angles: np.ndarray) -> float:
@@ -76,8 +78,13 @@ def session(folder: Path) -> Session:
 
 
 # %%
-def draped(folder: Path, spacing: int, friction: float, sheet: float) -> dict[str, Any]:
-    """One drape: the five angles, the largest shear angle [degrees] and the crossings."""
+def draped(
+    folder: Path, spacing: int, friction: float, sheet: float, force: float | None = None
+) -> dict[str, Any]:
+    """One drape: the five angles and the largest shear angle [degrees], the crossings and so on.
+
+    The holder closes to its gap, or is pushed by a force [N].
+    """
     settings = [
         f"tow.width_mm={WIDTHS[spacing]}",
         f"sheet.width_mm={sheet}",
@@ -85,6 +92,7 @@ def draped(folder: Path, spacing: int, friction: float, sheet: float) -> dict[st
         f"sheet.warp_spacing_mm={spacing}",
         f"sheet.weft_spacing_mm={spacing}",
         f"contact.friction={friction}",
+        *([] if force is None else [f"holder_force_N={force}"]),
     ]
     case = load_case(HERE / "drape.yaml", settings)
     assert isinstance(case, DrapeCase)
@@ -98,7 +106,51 @@ def draped(folder: Path, spacing: int, friction: float, sheet: float) -> dict[st
         "places": np.array([[point["x_mm"], point["y_mm"]] for point in quantities["points"]]),
         "largest_shear_deg": quantities["largest_shear_angle_deg"],
         "crossings": pd.read_csv(folder / "crossings.csv"),
+        "punch_force_N": quantities["punch_force_N"],
+        "compressed": compressed(folder),
     }
+
+
+def compressed(folder: Path) -> float:
+    """Share of the tows' cells that the last step left shorter than they were."""
+    with np.load(max((folder / "steps").glob("step_*.npz"))) as last:
+        return float((last["history: strain"][:, 0] < 0.0).mean())
+
+
+def zigzag(crossings: pd.DataFrame, inside: bool) -> float:
+    """RMS of the tows' zigzag seen from above, within the hole or on the flange [degrees].
+
+    From t, the turn of a tow at a crossing: (2 t − t before − t after)/4 is t where the turns
+    alternate, and nothing where they are the same or grow evenly along the tow.
+    """
+    found = []
+    for along, across in (("y0_mm", "x0_mm"), ("x0_mm", "y0_mm")):
+        for _, own in crossings.groupby(crossings[across].round(6)):
+            places = own.sort_values(along)[["x_mm", "y_mm"]].to_numpy()
+            pieces = np.diff(places, axis=0)
+            turn = np.degrees(np.diff(np.unwrap(np.arctan2(pieces[:, 1], pieces[:, 0]))))
+            zigzags = (2.0 * turn[1:-1] - turn[:-2] - turn[2:]) / 4.0
+            radius = np.hypot(*places[2:-2].T)
+            # The hole's radius is 80 mm; its rounded edge, where tows bend, ends at 90 mm.
+            found.append(zigzags[radius < 80.0 if inside else radius > 90.0])
+    return float(np.sqrt(np.mean(np.square(np.concatenate(found)))))
+
+
+def wave_table(rows: dict[tuple[int, float, float | None], dict[str, Any]]) -> str:
+    """Zigzag, compression and punch force by spacing, friction and holder force."""
+    lines = [
+        "| spacing | holder | friction | zigzag in the dome | on the flange | in compression "
+        "| punch |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for (spacing, friction, force), row in rows.items():
+        holder = "closed to its gap" if force is None else f"{force:.0f} N"
+        inside, outside = (zigzag(row["crossings"], where) for where in (True, False))
+        lines.append(
+            f"| {spacing} mm | {holder} | {friction:g} | {inside:.1f}° | {outside:.1f}° | "
+            f"{100.0 * row['compressed']:.0f} % | {row['punch_force_N']:.0f} N |"
+        )
+    return "\n".join(lines)
 
 
 # %% [markdown]
@@ -329,6 +381,16 @@ The five points are marked in red, where they end. What to make of it:
 
 {verdict}
 
+## Waves, and a holder that stretches the tows
+
+{waves}
+
+Without friction nothing holds the tows back: they run in as the punch draws, are as often in
+compression as in tension, and zigzag from crossing to crossing, as the paper's simulation had it
+too. A holder force alone does not help; with friction it puts the tows in tension, and the
+waves go. Zigzag is the part of a tow's turn at a crossing, seen from above, that alternates; some
+of it on the flange is the bend at the die's edge.
+
 ## The cantilevers
 
 Table 3 was fitted to three overhangs whose shapes are in a figure. The model's, per spacing:
@@ -424,6 +486,12 @@ def main(folder: Path = Path("results/paper")) -> dict[str, Any]:
     work = folder / "run"
     keys = [(s, mu, float(SHEETS[s])) for s in WIDTHS for mu in FRICTIONS] + [(10, 0.0, 280.0)]
     drapes = {key: draped(work, *key) for key in keys}
+    waves = {(s, mu, None): drapes[s, mu, float(SHEETS[s])] for s in (12, 10) for mu in FRICTIONS}
+    waves |= {
+        (s, mu, force): draped(work, s, mu, float(SHEETS[s]), force)
+        for s in (12, 10)
+        for force, mu in PRESSED
+    }
     strips = {spacing: hung(work, spacing) for spacing in WIDTHS}
     curves, change = frames(work)
     if comm.rank == 0:
@@ -438,6 +506,7 @@ def main(folder: Path = Path("results/paper")) -> dict[str, Any]:
         forces=force_table(curves),
         change=change_table(change),
         verdict=verdict(angles),
+        waves=wave_table(dict(sorted(waves.items(), key=lambda item: -item[0][0]))),
     )
     return {
         "page": page,
@@ -445,6 +514,7 @@ def main(folder: Path = Path("results/paper")) -> dict[str, Any]:
         "rms_deg": {key: rms(value) for key, value in angles.items()},
         "largest_shear_deg": {key: value["largest_shear_deg"] for key, value in drapes.items()},
         "C1_change": change,
+        "zigzag_deg": {key: zigzag(value["crossings"], True) for key, value in waves.items()},
     }
 
 

@@ -1,6 +1,7 @@
 """The paper's experiments by demos/paper.py: what of them does not hang on assumptions."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from test_demos import demo
 
@@ -47,6 +48,18 @@ def test_cantilevers_of_two_spacings_weigh_and_bend_alike(paper, tmp_path):
     assert len(paper.tip_table({12: shapes}).splitlines()) == 5
 
 
+def test_zigzag_of_given_tows(paper):
+    """Turns of ±2a at the crossings of a zigzag by ±a; none of an arc's, which are all the same."""
+    k = np.arange(13)
+    angle = np.radians(2.0) * (-1.0) ** k[:-1]
+    places = np.vstack([[0.0, 0.0], np.cumsum(np.column_stack([np.cos(angle), np.sin(angle)]), 0)])
+    arc = np.radians(3.0) * k
+    for x, y, exact in ((*places.T, 4.0), (40 * np.sin(arc), 40 * np.cos(arc), 0.0)):
+        one = {"x0_mm": 1.0 * k, "y0_mm": 0.0 * k, "x_mm": x, "y_mm": y}
+        # The other family's tows have one crossing each here, and no turns.
+        assert paper.zigzag(pd.DataFrame(one), True) == pytest.approx(exact, abs=1e-9)
+
+
 @pytest.mark.slow
 def test_drapes_of_the_three_spacings(paper, tmp_path):
     """No validation: the places of the points are assumed. It guards what the page says."""
@@ -55,6 +68,10 @@ def test_drapes_of_the_three_spacings(paper, tmp_path):
         assert value < 8.0, key
     for key, value in results["largest_shear_deg"].items():
         assert 30.0 < value < 40.0, key
+    for spacing in (12, 10):
+        # The waves of frictionless tools, and what friction under a holder leaves of them.
+        assert results["zigzag_deg"][spacing, 0.0, None] > 2.0
+        assert results["zigzag_deg"][spacing, 0.3, 1000.0] < 1.2
     assert "{" not in results["page"]
     for name in ("drape", "cantilever", "picture_frame"):
         assert 10_000 < (tmp_path / f"paper_{name}.png").stat().st_size < 200_000
