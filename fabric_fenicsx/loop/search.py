@@ -43,6 +43,10 @@ LEAST = 4.0
 #: Sigmas beyond which a reading pulls a fit less: it may be wrong, or lie beyond a corner of a law
 #: that the fit has not reached, where least squares would stay.
 FAR = 3.0
+#: Probability below which no size of a residual excuses its structure.
+HOPELESS = 1e-8
+#: Share of the range that a reading is good to where no noise is given.
+READ = 0.005
 #: Effects at most: any three of them would fit almost anything.
 MOST = 2
 #: Effects whose pairs with every other are tried where no single one explains the data.
@@ -270,11 +274,11 @@ class _Search:
 
     # Fits ---------------------------------------------------------------------------------
 
-    def _criterion(self, model: Fit | None) -> float:
+    def _criterion(self, model: Fit | None, noise: float | None = None) -> float:
         """χ² + k ln n; smaller is better. Residuals beyond a limit count by their size only."""
         if model is None:
             return float("inf")
-        limit = FAR * self.noise
+        limit = FAR * (noise or self.noise)
         z = (model.residual * model.weight)[model.used] / limit
         size = 2.0 * FAR**2 * float(np.sum(np.sqrt(1.0 + z**2) - 1.0))
         return size + len(model.values) * float(np.log(max(int(model.used.sum()), 2)))
@@ -355,19 +359,28 @@ class _Search:
     def _explains(self, model: Fit) -> bool:
         """Whether a model leaves noise: in size on what was fitted and on what was held out."""
         count = int(self.rows.sum())
-        scatter = np.sqrt(model.sum_of_squares / model.freedom) / self.noise
+        near = self._near
+        if self.given:
+            white = self._whiteness(model)
+            if min(white.blocks, white.lags, white.period) < HOPELESS:
+                return False
+        scatter = np.sqrt(model.sum_of_squares / model.freedom) / near
         if scatter > max(1.1, _upper(model.freedom)):
-            return False
-        white = self._whiteness(model)
-        if min(white.blocks, white.lags, white.period) < 1e-8:
             return False
         out = self._held_rows()
         if out.any():
             # A prediction is as uncertain as the parameters it is made with.
             doubt = float(np.sqrt(1.0 + np.mean(model.leverage[out])))
             limit = max(NEAR, _upper(int(out.sum()))) * doubt
-            return bool(self._holdout(model) / self.noise <= limit)
+            return bool(self._holdout(model) / near <= limit)
         return count > len(model.values)
+
+    @property
+    def _near(self) -> float:
+        """What a reading is good to: a curve read from a figure scatters less than it is right."""
+        if self.given:
+            return self.noise
+        return max(self.noise, READ * float(np.ptp(self.readings.observed[self.rows])))
 
     def _held_rows(self) -> Flags:
         return np.asarray(self.readings.holdout & self.readings.usable & ~self.outliers)
@@ -427,7 +440,7 @@ class _Search:
     ) -> dict[str, list[str]]:
         """For each effect, the others that could take its place in the model."""
         found: dict[str, list[str]] = {}
-        limit = self._criterion(chosen) + DECISIVE
+        limit = self._criterion(chosen, self._near) + DECISIVE
         for own in effects:
             others = [c for c in singles if c.effect not in effects]
             found[own.name] = []
@@ -438,7 +451,7 @@ class _Search:
                     kept = next(e for e in effects if e is not own)
                     base = next(c.fit for c in singles if c.effect is kept)
                     instead = self._best_variant(base, other.effect) if base else None
-                if instead is not None and self._criterion(instead) < limit:
+                if instead is not None and self._criterion(instead, self._near) < limit:
                     found[own.name].append(other.effect.name)
         return found
 
