@@ -81,6 +81,8 @@ class PictureFrame:
                 "time [s]": time,
             },
         )
+        doubt = np.concatenate([p.doubt for p in programmes])
+        self._leave_out_uncertain(doubt * self._at_readings(kinematics["rate_per_speed"].value))
         shares = {
             "duration": max(float(p.time[-1] - p.time[0]) for p in programmes),
             "angle": float(np.abs(gamma).max()),
@@ -88,6 +90,22 @@ class PictureFrame:
             "travel": float(np.abs(self._points["D"].value).max()),
         }
         self.effects = [_scaled(e, shares) for e in (*PICTURE_FRAME_EFFECTS, *own)]
+
+    def _leave_out_uncertain(self, doubt: Array) -> None:
+        """Leave out readings whose rate is so uncertain [rad/s] that the dashpot's force is.
+
+        By more than a reading scatters, with the dashpot of a first fit; never more than half.
+        """
+        rows = self.readings.fit
+        _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
+        J = np.column_stack([slopes[p.name] for p in self.baseline])
+        if self.noise is None or rows.sum() <= len(self.baseline):
+            return
+        k = np.linalg.lstsq(J[rows], self.readings.observed[rows], rcond=None)[0]
+        factor = self._at_readings(self._kinematics(self._travel(None, {}), {})["factor"].value)
+        clear = np.abs(k[-1] * factor * doubt) < self.noise
+        if (rows & clear).sum() > rows.sum() / 2:
+            self.readings = replace(self.readings, usable=self.readings.usable & clear)
 
     def _lay_out(self, programmes: Sequence[Programme]) -> None:
         """Records side by side; the shorter ones rest at their last point."""
@@ -168,6 +186,7 @@ class PictureFrame:
             outputs = {
                 "gamma": gamma,
                 "rate": derivative_of(gamma, at["D"]) * at["D_rate"],
+                "rate_per_speed": derivative_of(gamma, at["D"]),
                 "factor": at["fabric"] ** 2 / (at["frame"] * sin(theta)),
             }
             self._compiled[0] = marched.define(outputs, {})

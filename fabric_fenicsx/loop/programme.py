@@ -38,6 +38,7 @@ class Programme:
         displacement: [mm], (n,).
         rate: its rate [mm/s] on the piece that a point belongs to, (n,).
         reading: index of the reading at each point; -1 for a corner between readings.
+        doubt: by how much two estimates of the rate at each reading differ [mm/s], (n_readings,).
         certain: whether the rate at each reading is known: not at a corner, nor where the speed
             changed faster than it was sampled, (n_readings,).
     """
@@ -46,6 +47,7 @@ class Programme:
     displacement: Array
     rate: Array
     reading: npt.NDArray[np.int64]
+    doubt: Array
     certain: Flags
 
 
@@ -62,16 +64,17 @@ def programme(time: Array, displacement: Array) -> Programme:
     rate = np.zeros_like(time)
     top = float(np.abs(np.diff(displacement) / np.diff(time)).max())
     near = 1e-6 * float(np.ptp(time))
-    certain = np.ones(len(time), dtype=bool)
+    certain, doubt = np.ones(len(time), dtype=bool), np.zeros_like(rate)
     added: list[tuple[float, float, float]] = []
     for low, high in pairwise(edges):
         inside = np.flatnonzero((time >= low - near) & (time <= high + near))
         if len(inside) == 0:
             continue
         # A reading at a corner belongs to the piece before it.
-        rates, known = _rates(time[inside], displacement[inside], resolution, top)
+        rates, unsure = _rates(time[inside], displacement[inside], resolution, top)
         own = (time[inside] > low + near) | ~np.isfinite(low)
-        rate[inside[own]], certain[inside[own]] = rates[own], known[own]
+        rate[inside[own]], doubt[inside[own]] = rates[own], unsure[own]
+    certain &= doubt < DOUBT * top
     for corner in corners:
         at = np.abs(time - corner) <= near
         if at.any():
@@ -99,7 +102,7 @@ def programme(time: Array, displacement: Array) -> Programme:
     points.sort(key=lambda point: point[0])
     columns = np.array(points)
     return Programme(
-        columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3].astype(np.int64), certain
+        columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3].astype(np.int64), doubt, certain
     )
 
 
@@ -132,18 +135,18 @@ def _resolution(values: Array) -> float:
     return 0.0
 
 
-def _rates(time: Array, displacement: Array, resolution: float, top: float) -> tuple[Array, Flags]:
-    """Rate at each point of one piece, and whether it is known.
+def _rates(time: Array, displacement: Array, resolution: float, top: float) -> tuple[Array, Array]:
+    """Rate at each point of one piece, and by how much another estimate differs.
 
-    A quartic through the points around it; known where a parabola through the nearer half of them
-    agrees. Where the motion changes faster than it was sampled they differ.
+    A quartic through the points around it, and a parabola through the nearer half of them. Where
+    the motion changes faster than it was sampled they differ.
     """
     count = len(time)
     if count < 3:
         slope = float((displacement[-1] - displacement[0]) / np.ptp(time)) if count == 2 else 0.0
-        return np.full(count, slope), np.zeros(count, dtype=bool)
+        return np.full(count, slope), np.full(count, np.inf)
     if np.ptp(displacement) <= 2.0 * resolution:
-        return np.zeros(count), np.ones(count, dtype=bool)
+        return np.zeros(count), np.zeros(count)
     step = np.ptp(time) / (count - 1)
     # Wide enough for the rounding of the record to average out.
     half = int(np.clip(np.ceil(resolution / (0.1 * DOUBT * top * step)), 1, 6))
@@ -151,7 +154,7 @@ def _rates(time: Array, displacement: Array, resolution: float, top: float) -> t
     for i in range(count):
         near[i] = _slope_at(time, displacement, i, half, 2)
         far[i] = _slope_at(time, displacement, i, 2 * half, 4)
-    return far, np.abs(far - near) < DOUBT * top
+    return far, np.abs(far - near)
 
 
 def _slope_at(time: Array, values: Array, i: int, half: int, degree: int) -> float:
