@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import yaml
 
-from fabric_fenicsx.errors import InputError
-from fabric_fenicsx.loop.drape import OTHER_MESH, Drape, hermite_weights
+from fabric_fenicsx.errors import InputError, SolveError
+from fabric_fenicsx.loop.drape import OTHER_MESH, Drape, nearest_next
 from fabric_fenicsx.loop.drape_effects import DRAPE_EFFECTS
 from fabric_fenicsx.loop.fitting import fit
 from fabric_fenicsx.loop.measurement import read_measurement
 from fabric_fenicsx.loop.report import test_report as report_of
 from fabric_fenicsx.loop.search import diagnose_test
-from fabric_fenicsx.loop.shear_field import ShearField, ShearLaw, drape_case
+from fabric_fenicsx.loop.shear_field import ShearField, ShearLaw, drape_case, hermite_weights
 from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session
 from fabric_fenicsx.rigs.drape import build
@@ -162,6 +162,7 @@ def test_offset_and_rotation_move_the_pattern(tmp_path):
     values = {"dx_mm": 6.0, "dy_mm": -4.0, "rotation_deg": 5.0}
     moves = (FORMS["punch_offset"], FORMS["ply_rotation"])
     expected, _ = drape.predict(moves, values)
+    x, y = x[drape.readings.row], y[drape.readings.row]
     # The field is filtered and interpolated: by a tenth of a degree it is another.
     assert expected == pytest.approx(angle(*turned(x - 6.0, y + 4.0, 5.0)), abs=0.15)
     other_order, _ = drape.predict(moves[::-1], values)
@@ -201,7 +202,8 @@ def test_without_an_effect_the_baseline_explains_the_data(tmp_path):
     diagnosis = diagnose_test(drape)
     assert diagnosis.verdict == "no_effect"
     assert diagnosis.baseline.values == {}
-    assert diagnosis.baseline.residual == pytest.approx(angles - angle(x, y), abs=0.15)
+    row = drape.readings.row
+    assert diagnosis.baseline.residual == pytest.approx((angles - angle(x, y))[row], abs=0.15)
 
 
 def test_a_model_without_parameters_has_nothing_to_fit(tmp_path):
@@ -219,7 +221,8 @@ def test_readings_are_weighed_by_their_sigma_and_the_models_own_scatter(tmp_path
     drape = draped(tmp_path, x, y, angle(x, y), noise=None, std=std)
     assert drape.noise == pytest.approx(np.sqrt(np.mean(std**2)))
     scatter = drape.model_scatter
-    assert drape.readings.weight == pytest.approx(drape.noise / np.sqrt(std**2 + scatter**2))
+    sigma = np.hypot(std[drape.readings.row], scatter)
+    assert drape.readings.weight == pytest.approx(drape.noise / sigma)
     # Half the mean square of a ripple of 0.01 rad at most.
     assert 0.0 < scatter.min() < scatter.max() < np.degrees(0.01)
 
@@ -229,9 +232,65 @@ def test_obtuse_angles_are_made_acute_all_or_none(tmp_path):
     signed = np.where(x * y > 0.0, angle(x, y), 180.0 - angle(x, y))
     assert signed.max() > 100.0
     drape = draped(tmp_path, x, y, signed)
-    assert drape.readings.observed == pytest.approx(angle(x, y), abs=1e-6)
+    row = drape.readings.row
+    assert drape.readings.observed == pytest.approx(angle(x, y)[row], abs=1e-6)
     near = np.minimum(angle(x, y) + 3.0, 95.0)
-    assert draped(tmp_path, x, y, near).readings.observed == pytest.approx(near, abs=1e-6)
+    assert draped(tmp_path, x, y, near).readings.observed == pytest.approx(near[row], abs=1e-6)
+
+
+def test_noise_that_is_not_given_is_estimated_from_places_side_by_side(tmp_path):
+    x, y = marks(count=200)
+    angles = angle(x - 8.0, y) + np.random.default_rng(5).normal(0.0, 1.0, len(x))
+    diagnosis = diagnose_test(draped(tmp_path, x, y, angles, noise=None), ["punch_offset"])
+    assert diagnosis.noise == pytest.approx(1.0, rel=0.25)
+    assert diagnosis.noise_source.startswith("estimated")
+    assert diagnosis.verdict == "effect_found"
+
+
+def test_readings_are_put_in_an_order_of_neighbours():
+    x = np.array([0.0, 5.0, 1.0, 6.0, 2.0])
+    assert nearest_next(x, np.zeros(5)).tolist() == [3, 1, 4, 2, 0]
+
+
+def test_an_outlier_is_told_by_its_row_in_the_file(tmp_path):
+    x, y = marks()
+    angles = angle(x, y) + np.random.default_rng(2).normal(0.0, 1.0, len(x))
+    angles[17] -= 40.0
+    drape = draped(tmp_path, x, y, angles)
+    report = report_of(diagnose_test(drape, ["ply_rotation"]), drape.measurements)
+    assert [entry["reading"] for entry in report["left_out"]["outliers"]] == [18]
+
+
+def test_an_amplitude_without_a_solution_ends_the_range_and_is_told(tmp_path):
+    def solve(case):
+        if case.contact.friction > 0.3:
+            raise SolveError("the step length fell to nothing")
+        return made_up(case)
+
+    x, y = marks()
+    measurement = written(tmp_path, x, y, angle(x, y))
+    drape = Drape([measurement], solve=solve)
+    at_last, _ = drape.predict((FORMS["tool_friction"],), {"mu": 0.2})
+    beyond, slopes = drape.predict((FORMS["tool_friction"],), {"mu": 0.6})
+    assert (beyond == at_last).all()
+    assert (slopes["mu"] == 0.0).all()
+    assert any("mu = 0.4: the step length" in note for note in drape.notes)
+
+
+def test_the_law_of_other_tests_is_taken(tmp_path):
+    cases = []
+    x, y = marks()
+    drape = Drape(
+        [written(tmp_path, x, y, angle(x, y))], solve=lambda c: cases.append(c) or made_up(c)
+    )
+    law = {"k1_N": -0.01, "k3_N": 0.05, "c1_N_s": 1.0}
+    drape.take({"picture_frame": law, "cantilever": {"C1_MPa": 2000.0}})
+    drape.predict((), {})
+    crossover = cases[0].crossover
+    assert (crossover.k1_N_mm, crossover.k3_N_mm, crossover.dashpot_N_s_mm) == (0.0, 0.05, 1.0)
+    assert cases[0].tow.C1_MPa == 2000.0
+    assert "fitted to the other tests" in drape.notes[0]
+    assert "fitted to the other tests" in drape.notes[1]
 
 
 def test_the_case_weighs_what_the_fabric_does(tmp_path):

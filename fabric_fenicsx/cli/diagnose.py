@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..loop.effects import Effect
     from ..loop.experiment import Experiment
     from ..loop.measurement import Measurement
+    from ..loop.search import Diagnosis
 
 __all__ = ["diagnose"]
 
@@ -136,11 +137,14 @@ def _report(
     progress: Callable[[float, str], None],
 ) -> dict[str, Any]:
     """Search and write; report.json comes last."""
+    from ..loop.drape import Drape
     from ..loop.page import write_page
     from ..loop.report import combined_report, test_report, write_report
 
-    parts = []
+    parts: list[tuple[Diagnosis, dict[str, Any]]] = []
     for number, (experiment, own) in enumerate(tests):
+        if isinstance(experiment, Drape):
+            experiment.take({d.experiment.test: d.baseline.values for d, _ in parts})
         diagnosis = _search(experiment, names, _part(progress, number, len(tests)))
         parts.append((diagnosis, test_report(diagnosis, own)))
     report = combined_report([part for _, part in parts])

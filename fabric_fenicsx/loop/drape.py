@@ -18,15 +18,16 @@ left of it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicHermiteSpline, RegularGridInterpolator
+from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import gaussian_filter
 
+from ..errors import SolveError
 from ..rigs.cases import DrapeCase
 from .drape_effects import DRAPE_EFFECTS
 from .effects import DrapeVariant, Effect, Parameter, Variant
@@ -34,7 +35,7 @@ from .experiment import Readings
 from .marching import Marched, Varying
 from .measurement import Measurement
 from .noise import estimated_noise
-from .shear_field import ShearField, ShearLaw, Solve, drape_case, solved_field
+from .shear_field import ShearField, ShearLaw, Solve, drape_case, hermite_weights, solved_field
 
 __all__ = ["Drape"]
 
@@ -86,6 +87,7 @@ class Drape:
         self.effects = [*DRAPE_EFFECTS, *own]
         self._solve = solve
         self._fields: dict[str, ShearField] = {}
+        self._unsolved: dict[tuple[str, float], str] = {}
         self._compiled: dict[int, Marched] = {}
         self.use(shear, C1, source)
 
@@ -106,16 +108,31 @@ class Drape:
         for m in self.measurements:
             self._case(m, {})
 
+    def take(self, fitted: Mapping[str, Mapping[str, float]]) -> None:
+        """Take what the baselines of other tests were fitted to, before anything has been solved.
+
+        Args:
+            fitted: parameters by test; of a picture frame k1_N, k3_N and c1_N_s are taken, of a
+                cantilever C1_MPa. A negative part of the shear law is left out.
+        """
+        shear, C1 = None, None
+        if "picture_frame" in fitted:
+            parts = (fitted["picture_frame"][name] for name in ("k1_N", "k3_N", "c1_N_s"))
+            shear = ShearLaw(*(max(part, 0.0) for part in parts))
+        if "cantilever" in fitted:
+            C1 = fitted["cantilever"]["C1_MPa"]
+        self.use(shear, C1, "fitted to the other tests")
+
     # Data ---------------------------------------------------------------------------------
 
     @cached_property
     def _sigma(self) -> Array:
         """One sigma of every reading [degrees], NaN where it is not given, (n,)."""
-        parts = []
+        parts: list[Array] = []
         for m in self.measurements:
             for run in m.runs:
                 given = np.full(run.count, np.nan if m.noise is None else m.noise)
-                parts.append(run.columns.get("std_deg", given))
+                parts.append(run.columns.get("std_deg", given)[self._order[len(parts)]])
         return np.concatenate(parts)
 
     @cached_property
@@ -126,12 +143,24 @@ class Drape:
         return float(np.sqrt(np.mean(self._sigma**2)))
 
     @cached_property
+    def _order(self) -> list[npt.NDArray[np.int64]]:
+        """Rows of each run's file, from one place to the nearest that is left."""
+        runs = [run.columns for m in self.measurements for run in m.runs]
+        return [nearest_next(c["x_mm"], c["y_mm"]) for c in runs]
+
+    def _column(self, name: str) -> Array:
+        """A column of all runs, in their order."""
+        runs = [run.columns for m in self.measurements for run in m.runs]
+        return np.concatenate([c[name][o] for c, o in zip(runs, self._order, strict=True)])
+
+    @cached_property
     def _sheets(self) -> list[_Sheet]:
+        x, y = self._column("x_mm"), self._column("y_mm")
         found, start = [], 0
         for m in self.measurements:
-            x, y = (np.concatenate([run.columns[c] for run in m.runs]) for c in ("x_mm", "y_mm"))
-            found.append(_Sheet(m, x, y, np.arange(start, start + len(x))))
-            start += len(x)
+            rows = np.arange(start, start + sum(run.count for run in m.runs))
+            found.append(_Sheet(m, x[rows], y[rows], rows))
+            start += len(rows)
         return found
 
     @cached_property
@@ -143,10 +172,10 @@ class Drape:
         """
         runs = [run for m in self.measurements for run in m.runs]
         counts = [run.count for run in runs]
-        angle = np.concatenate([run.columns["angle_deg"] for run in runs])
+        angle = self._column("angle_deg")
         if angle.max() > OBTUSE:
             angle = 90.0 - np.abs(90.0 - angle)
-        x, y = (np.concatenate([getattr(s, c) for s in self._sheets]) for c in ("x", "y"))
+        x, y = self._column("x_mm"), self._column("y_mm")
         readings = Readings(
             observed=angle,
             run=np.repeat(np.arange(len(runs)), counts),
@@ -160,6 +189,7 @@ class Drape:
                 "x [mm]": x,
                 "y [mm]": y,
             },
+            row=np.concatenate(self._order),
         )
         sigma = self._sigma
         noise = self.noise
@@ -168,9 +198,7 @@ class Drape:
             noise = estimated_noise(residual, readings, readings.fit)
             sigma = np.where(np.isnan(sigma), noise, sigma)
         weight = noise / np.hypot(sigma, self.model_scatter)
-        return Readings(
-            **{n: getattr(readings, n) for n in readings.__slots__} | {"weight": weight}
-        )
+        return replace(readings, weight=weight)
 
     @cached_property
     def model_scatter(self) -> Array:
@@ -214,6 +242,7 @@ class Drape:
             f"The model's own scatter, from two meshes, is {scatter:.2g} degrees rms at these "
             "places. Readings are weighted with it and errors are weighted errors: one as large "
             "as the noise means a misfit of noise and model scatter together.",
+            *(f"{n} = {a:g}: {why}; left out." for (n, a), why in self._unsolved.items()),
         ]
 
     # Model --------------------------------------------------------------------------------
@@ -276,7 +305,7 @@ class Drape:
             if variant.changes is None:
                 continue
             name = variant.parameters[0].name
-            nodes, weights, by = hermite_weights(variant.solved_at, values[name])
+            nodes, weights, by = self._solved_weights(m, variant, values[name])
             for node, weight, slope in zip(nodes, weights, by, strict=True):
                 if node == 0.0:
                     base += weight - 1.0
@@ -287,6 +316,32 @@ class Drape:
             if 0.0 not in nodes:
                 base -= 1.0
         return [(self._field(m, {}), base, base_slopes), *found]
+
+    def _solved_weights(
+        self, m: Measurement, variant: DrapeVariant, value: float
+    ) -> tuple[list[float], list[float], list[float]]:
+        """hermite_weights of the amplitudes that have a solution; those needed are solved.
+
+        Raises:
+            SolveError: none of them has one.
+        """
+        assert variant.changes is not None
+        name = variant.parameters[0].name
+        while True:
+            left = [a for a in variant.solved_at if (name, a) not in self._unsolved]
+            if not left:
+                raise SolveError(f"no drape with {name} runs to its end")
+            found = hermite_weights(left, value)
+            for node in found[0]:
+                if node == 0.0:
+                    continue
+                try:
+                    self._field(m, variant.changes(node))
+                except SolveError as error:
+                    self._unsolved[name, node] = str(error)
+                    break
+            else:
+                return found
 
     def _field(self, m: Measurement, changes: Mapping[str, Any]) -> ShearField:
         raw = self._raw(m, changes)
@@ -308,26 +363,15 @@ class Drape:
         return drape_case(m, self._shear, C1, {"sheet.subdivisions": MESH, **changes})
 
 
-def hermite_weights(
-    solved_at: Sequence[float], value: float
-) -> tuple[list[float], list[float], list[float]]:
-    """Interpolation among the fields at zero and at the given amplitudes.
+def nearest_next(x: Array, y: Array) -> npt.NDArray[np.int64]:
+    """An order of places, (n,), in which each is followed by the nearest of those left.
 
-    Piecewise cubic with slopes by second-order differences, so that only the interval's ends and
-    their neighbours matter: once continuously differentiable, linear in the fields.
-
-    Args:
-        solved_at: amplitudes, without zero.
-        value: the amplitude that is asked for; taken to the nearest end beyond them.
-
-    Returns:
-        The amplitudes that matter, their fields' weights, and the weights' derivatives.
+    It begins with the outermost. So stretches of readings are parts of the sheet.
     """
-    nodes = np.unique([0.0, *solved_at])
-    inside = float(np.clip(value, nodes[0], nodes[-1]))
-    k = int(np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, len(nodes) - 2))
-    near = nodes[max(k - 1, 0) : k + 3]
-    unit = np.eye(len(near))
-    tangents = np.gradient(unit, near, axis=0, edge_order=2 if len(near) > 2 else 1)
-    spline = CubicHermiteSpline(near, unit, tangents, axis=0)
-    return near.tolist(), spline(inside).tolist(), spline(inside, 1).tolist()
+    left = np.arange(len(x))
+    order = [int(np.argmax(np.hypot(x, y)))]
+    while len(order) < len(x):
+        left = left[left != order[-1]]
+        away = np.hypot(x[left] - x[order[-1]], y[left] - y[order[-1]])
+        order.append(int(left[np.argmin(away)]))
+    return np.array(order, dtype=np.int64)

@@ -19,7 +19,7 @@ Flags = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """All readings of a test, in the order of its runs.
+    """All readings of a test, in the order of its runs; in a run, neighbours next to each other.
 
     Attributes:
         observed: of the quantity that is compared, (n,).
@@ -29,6 +29,8 @@ class Readings:
         weight: 1 over the given sigma of a reading relative to the others, (n,); ones by default.
         names: of the runs.
         covariates: what the residual is shown against, by name with unit, each (n,).
+        row: of each in its file, from 0, (n,), where readings of a run stand in another order; None
+            where they do not.
     """
 
     observed: Array
@@ -38,6 +40,7 @@ class Readings:
     weight: Array
     names: tuple[str, ...]
     covariates: Mapping[str, Array]
+    row: npt.NDArray[np.int64] | None = None
 
     @property
     def fit(self) -> Flags:

@@ -316,12 +316,18 @@ def signatures(
         base: the model so far.
         variant: the effect's form.
         amplitudes: also at the starts of its amplitudes, where it has any; else all but at zero.
+
+    Returns:
+        One for each of them where the model has a solution.
     """
     found = []
     names = [*base.values, *(p.name for p in variant.amplitudes)]
     for shape in variant.grid(amplitudes=amplitudes):
         at = base.values | {p.name: SMALL for p in variant.amplitudes} | shape
-        expected, slopes = experiment.predict((*base.variants, variant), at)
+        try:
+            expected, slopes = experiment.predict((*base.variants, variant), at)
+        except SolveError:
+            continue
         found.append(Signature(at, expected, {name: slopes[name] for name in names}))
     return found
 

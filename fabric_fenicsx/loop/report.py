@@ -247,7 +247,10 @@ def _left_out(d: Diagnosis, measurements: Sequence[Measurement]) -> dict[str, An
         place = {"folder": str(m.folder), "file": run.file}
         own = np.flatnonzero(readings.run == number)
         for i in np.flatnonzero(d.outliers[own]):
-            outliers.append(place | {"reading": int(i) + 1, "observed": readings.observed[own[i]]})
+            row = i if readings.row is None else readings.row[own[i]]
+            outliers.append(
+                place | {"reading": int(row) + 1, "observed": readings.observed[own[i]]}
+            )
         count = int((~readings.usable[own]).sum())
         if count:
             unknown.append(place | {"readings": count, "of": len(own)})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -14,7 +14,7 @@ from mpi4py import MPI
 import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
-from scipy.interpolate import RectBivariateSpline
+from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
 
 from ..errors import InputError, SolveError
 from ..rigs.cases import DrapeCase
@@ -23,7 +23,7 @@ from ..rigs.drape import build
 from ..solving.simulation import simulate
 from .measurement import FILE, Measurement
 
-__all__ = ["ShearField", "ShearLaw", "Solve", "drape_case", "solved_field"]
+__all__ = ["ShearField", "ShearLaw", "Solve", "drape_case", "hermite_weights", "solved_field"]
 
 Array = npt.NDArray[np.float64]
 
@@ -188,3 +188,29 @@ def solved_field(case: DrapeCase) -> ShearField:
         raise SolveError(f"the drape stopped before its end: {outcome.stop}")
     places = model.net.points[model.net.crossings].mean(axis=1)[:, :2]
     return ShearField.of_quarter(places, outcome.last.shear_angle)
+
+
+def hermite_weights(
+    solved_at: Sequence[float], value: float
+) -> tuple[list[float], list[float], list[float]]:
+    """Interpolation among the fields at zero and at the given amplitudes.
+
+    Piecewise cubic with slopes by second-order differences, so that only the interval's ends and
+    their neighbours matter: once continuously differentiable, linear in the fields.
+
+    Args:
+        solved_at: amplitudes, without zero.
+        value: the amplitude that is asked for; taken to the nearest end beyond them.
+
+    Returns:
+        The amplitudes that matter, their fields' weights, and the weights' derivatives.
+    """
+    nodes = np.unique([0.0, *solved_at])
+    inside = float(np.clip(value, nodes[0], nodes[-1]))
+    k = int(np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, len(nodes) - 2))
+    near = nodes[max(k - 1, 0) : k + 3]
+    unit = np.eye(len(near))
+    tangents = np.gradient(unit, near, axis=0, edge_order=2 if len(near) > 2 else 1)
+    spline = CubicHermiteSpline(near, unit, tangents, axis=0)
+    slopes = spline(inside, 1) if inside == value else np.zeros(len(near))
+    return near.tolist(), spline(inside).tolist(), slopes.tolist()
