@@ -30,6 +30,7 @@ WRITTEN: dict[str, str] = {
     "Division": "{} / {}",
     "Power": "pow({}, {})",
     "Abs": "fabs({})",
+    "Real": "{}",
     "Sign": "({0} > 0) - ({0} < 0)",
     "Sqrt": "sqrt({})",
     "Exp": "exp({})",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ __all__ = [
     "StripVariant",
     "Variant",
     "read_effects",
+    "scaled",
 ]
 
 Values = Mapping[str, Any]
@@ -42,7 +43,8 @@ class Parameter:
         amplitude: whether it is the strength of an effect, zero in the baseline.
         meaning: one line for the report.
         share_of: "duration", "angle", "rate" or "travel": starts and bounds are shares of the
-            longest run, or of the largest shear angle, rate or displacement in the data.
+            longest run, or of the largest shear angle, rate or displacement in the data; of a
+            cantilever "curvature" or "moment", the largest of them in the fitted baseline.
     """
 
     name: str
@@ -155,6 +157,22 @@ class Effect:
     test: str
     meaning: str
     variants: Sequence[Variant]
+
+
+def scaled(effect: Effect, shares: Mapping[str, float]) -> Effect:
+    """An effect whose starts and bounds that are shares of the data's ranges have their unit."""
+
+    def parameter(p: Parameter) -> Parameter:
+        if not p.share_of:
+            return p
+        full = shares[p.share_of]
+        starts = tuple(full * s for s in p.starts)
+        return replace(p, starts=starts, lower=full * p.lower, upper=full * p.upper, share_of="")
+
+    variants = tuple(
+        replace(v, parameters=tuple(parameter(p) for p in v.parameters)) for v in effect.variants
+    )
+    return replace(effect, variants=variants)
 
 
 def read_effects(path: Path) -> list[Effect]:

@@ -25,6 +25,7 @@ OPERATORS: dict[str, Callable[..., Any]] = {
     "Division": np.divide,
     "Power": np.power,
     "Abs": np.abs,
+    "Real": np.real,
     "Sign": np.sign,
     "Sqrt": np.sqrt,
     "Exp": np.exp,
