@@ -27,13 +27,21 @@ SOFT = {"C1_MPa": REST * B / PER_C1, "m_s_N": (1 - REST) * B * CRITICAL, "kappa_
 #: Form of an effect, its parameters beside C1 = B/PER_C1, and the same for the elastica.
 CASES = {
     "baseline": (None, {}, {}),
-    "curved up": (("residual_curvature", "constant"), {"kappa0_1_mm": 1.6e-3}, {"curvature": 1.6e-3}),
+    "curved up": (
+        ("residual_curvature", "constant"),
+        {"kappa0_1_mm": 1.6e-3},
+        {"curvature": 1.6e-3},
+    ),
     "curved down": (
         ("residual_curvature", "constant"),
         {"kappa0_1_mm": -1.6e-3},
         {"curvature": -1.6e-3},
     ),
-    "hyperbolic": (("nonlinear_bending", "hyperbolic"), SOFT, {"law": ("hyperbolic", CRITICAL, REST)}),
+    "hyperbolic": (
+        ("nonlinear_bending", "hyperbolic"),
+        SOFT,
+        {"law": ("hyperbolic", CRITICAL, REST)},
+    ),
     "tanh": (("nonlinear_bending", "tanh"), SOFT, {"law": ("tanh", CRITICAL, REST)}),
     "stick and slip": (
         ("nonlinear_bending", "stick, then slip"),
@@ -117,7 +125,7 @@ def test_strip_is_the_elastica(exact, case):
 
 def test_effects_are_seen_in_the_elastica(exact):
     # None of them is within the tolerance above of the strip without it.
-    s, _, straight, _ = elastica()
+    straight = elastica()[2]
     for _, _, effect in list(CASES.values())[1:]:
         assert np.abs(elastica(**effect)[2] - straight).max() > 1.0
 
@@ -204,9 +212,7 @@ def test_readings_come_sorted():
 @pytest.mark.parametrize("case", [c for c in CASES if c not in ("baseline", "curved up")])
 def test_parameters_are_recovered(case):
     names, own, effect = CASES[case]
-    folder = measured(
-        (250.0, 200.0, 150.0, 100.0), effect, sigma=0.1, rng=np.random.default_rng(7)
-    )
+    folder = measured((250.0, 200.0, 150.0, 100.0), effect, sigma=0.1, rng=np.random.default_rng(7))
     experiment = Cantilever([folder])
     start = {"C1_MPa": experiment.baseline[0].starts[0]}
     base = fit(experiment, (), start, experiment.readings.fit)

@@ -129,7 +129,7 @@ class Cantilever:
         """Readings in the order of runs, in a run by length and along the strip."""
         tows: dict[tuple[float, ...], HangingTow] = {}
         table: list[Array] = []
-        run_of: list[Array] = []
+        run_of: list[npt.NDArray[np.int64]] = []
         keys: list[tuple[float, ...]] = []
         number = 0
         for m in measurements:
@@ -142,7 +142,7 @@ class Cantilever:
                 order = np.lexsort([along, c["length_mm"]])
                 columns = [c[n][order] for n in ("length_mm", "s_mm", "x_mm", "z_mm")]
                 table.append(np.stack(columns))
-                run_of.append(np.full(run.count, number))
+                run_of.append(np.full(run.count, number, dtype=np.int64))
                 number += 1
                 for length in columns[0]:
                     key = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
@@ -152,8 +152,8 @@ class Cantilever:
         self._length, self._arc, x, self._observed = np.concatenate(table, axis=1)
         self._run = np.concatenate(run_of)
         self._specimens = []
-        for key, tow_model in tows.items():
-            rows = np.array([i for i, other in enumerate(keys) if other == key])
+        for own, tow_model in tows.items():
+            rows = np.array([i for i, other in enumerate(keys) if other == own])
             self._specimens.append(
                 _Specimen(tow_model, rows, self._arc[rows], x[rows], self._observed[rows])
             )
@@ -313,7 +313,8 @@ def _smooth(x: Array, z: Array) -> tuple[Array, Array]:
     there, which is good enough an arc length for that.
 
     Args:
-        x, z: of the readings [mm], (n,).
+        x: of the readings [mm], (n,).
+        z: of the readings [mm], (n,).
     """
     far = np.hypot(x, z)
     u = far / far.max()

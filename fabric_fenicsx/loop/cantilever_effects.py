@@ -10,7 +10,7 @@ from typing import Any
 
 from ufl import max_value, min_value, tanh
 
-from .effects import Effect, Parameter, StripVariant, Values
+from .effects import Effect, Parameter, StripVariant
 
 __all__ = ["CANTILEVER_EFFECTS"]
 
@@ -69,9 +69,7 @@ CANTILEVER_EFFECTS = (
             # Beyond ±20 its derivatives, 1/cosh², would overflow on the way to zero.
             _slipping("tanh", lambda y: tanh(max_value(min_value(y, 20), -20))),
             _slipping("stick, then slip", lambda y: max_value(min_value(y, 1), -1)),
-            StripVariant(
-                "cubic", (CUBIC,), moment=lambda p, kappa: p["b_N_mm3"] * kappa**3
-            ),
+            StripVariant("cubic", (CUBIC,), moment=lambda p, kappa: p["b_N_mm3"] * kappa**3),
         ),
     ),
     Effect(

@@ -64,6 +64,9 @@ class Laws:
     turns: Sequence[Marched] = ()
 
 
+NONE = Laws()
+
+
 @dataclass(frozen=True, slots=True)
 class Shape:
     """A hanging tow and its derivatives.
@@ -126,12 +129,14 @@ class HangingTow:
         self._order = self.model.disc.local_cells
         cell = np.diff(self.arc) / 2.0
         self._weights = weight * (np.append(cell, 0.0) + np.append(0.0, cell))
-        self._laws, self._values = Laws(), {"C1_MPa": 0.0}
+        self._laws, self._values = NONE, {"B": 1.0}
         self._phi, self._root = 0.0, 0.0
         self._state = (fields.u_n.x.array, fields.q_n.x.array)
         self._flat = [values.copy() for values in self._state]
 
-    def solve(self, values: Mapping[str, float], laws: Laws = Laws(), *, slopes: bool = True) -> Shape:
+    def solve(
+        self, values: Mapping[str, float], laws: Laws = NONE, *, slopes: bool = True
+    ) -> Shape:
         """The shape for some parameters, from the last one.
 
         Args:
@@ -148,9 +153,9 @@ class HangingTow:
         self._newton.force_tolerance = self._rounding * values["C1_MPa"] + 1e-9 * float(
             self._weights.sum() * self._spacing
         )
-        phi = self._turn(self._root).value
+        phi = float(self._turn(self._root).value)
         for _ in range(TURNS):
-            self._balance(float(phi))
+            self._balance(phi)
             self._root = -float(self._weights @ self._positions()[0])
             turn = self._turn(self._root)
             miss = self._phi - float(turn.value)
