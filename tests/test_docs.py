@@ -20,9 +20,6 @@ DOCS = ROOT / "docs"
 BUILT = {"gallery", "keys.md"}
 """What `make docs` writes."""
 
-LATER = {"effects.md", "performance.md"}
-"""Pages that have a place in the menu and may not be there yet."""
-
 BLOCK = re.compile(r"(<!-- slow -->\n)?(?:<!-- file: (\S+) -->\n)?```(\w+)\n(.*?)```", re.S)
 
 COMMAND = re.compile(r"^\$ (.*)$", re.M)
@@ -105,7 +102,7 @@ def test_blocks_are_marked_as_what_they_are():
 def test_links_lead_somewhere():
     for page in DOCS.glob("*.md"):
         for target in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8")):
-            if not target.startswith("http") and target.split("/")[0] not in BUILT | LATER:
+            if not target.startswith("http") and target.split("/")[0] not in BUILT:
                 assert (DOCS / target).exists(), (page.name, target)
 
 
@@ -119,4 +116,4 @@ def test_every_page_is_in_the_menu():
 
     listed = set(files(menu))
     assert {page.name for page in DOCS.glob("*.md")} <= listed | BUILT
-    assert listed <= {page.name for page in DOCS.glob("*.md")} | BUILT | LATER
+    assert listed <= {page.name for page in DOCS.glob("*.md")} | BUILT

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module, metadata
 from pathlib import Path
@@ -165,9 +166,13 @@ def _cache() -> str | None:
     folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK):
         return None
-    sizes = [path.stat().st_size for path in folder.iterdir() if path.is_file()]
-    forms = len(list(folder.glob("*.so")))
-    return f"{folder}, {forms} compiled forms, {sum(sizes) / 1e6:.0f} MB"
+    forms, size = 0, 0
+    for path in folder.iterdir():
+        forms += path.suffix == ".so"
+        # What another process compiles right now comes and goes.
+        with suppress(FileNotFoundError):
+            size += path.stat().st_size
+    return f"{folder}, {forms} compiled forms, {size / 1e6:.0f} MB"
 
 
 def _gmsh() -> str:
@@ -198,6 +203,6 @@ def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=180,
         check=False,
     )
