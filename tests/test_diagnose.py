@@ -10,13 +10,17 @@ from html import unescape
 from html.parser import HTMLParser
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
 import yaml
 from measurements.bad import CASES, EXECUTED
 from measurements.sets import sixty
 from test_cli import MPI, contents
+from test_drape_loop import angle, made_up, marks, written
 
 from fabric_fenicsx.__main__ import main
+from fabric_fenicsx.loop import drape
+from fabric_fenicsx.loop.drape import Drape
 from fabric_fenicsx.loop.report import SCHEMA, parameter_unit
 
 RECIPES = {recipe.name: recipe for recipe in sixty(1)}
@@ -199,6 +203,40 @@ def test_units_are_those_of_the_names():
     units = {"k1_N": "N", "c1_N_s": "N s", "drift_N_s": "N/s", "rounding_rad_s": "rad/s", "n": ""}
     units |= {"slip_angle_rad": "rad", "free_travel_mm": "mm", "force_N": "N", "angle_deg": "°"}
     assert {name: parameter_unit(name) for name in units} == units
+
+
+def test_a_drape_takes_the_shear_law_of_the_frames(diagnosed, tmp_path, monkeypatch):
+    """The law that the frames gave is in the drape's case; the drape's fields come last."""
+    cases = []
+
+    class Quick(Drape):
+        def __init__(self, measurements, own=()):
+            super().__init__(measurements, own, solve=self.solve)
+
+        @staticmethod
+        def solve(case):
+            cases.append(case)
+            return made_up(case)
+
+    monkeypatch.setattr(drape, "Drape", Quick)
+    frames, _ = diagnosed["crossover_friction-dahl"]
+    sheet = tmp_path / "sheet"
+    sheet.mkdir()
+    x, y = marks()
+    noise = np.random.default_rng(0).normal(0.0, 1.0, x.shape)
+    written(sheet, x, y, angle(x, y) + noise, held=20)
+    assert command("diagnose", sheet, frames, "--out", tmp_path / "out") == 0
+    report = report_of(tmp_path / "out")
+    assert report["test"] == "drape" and list(report["tests"]) == ["picture_frame", "drape"]
+    assert report["verdict"] == "no_effect" and report["baseline"]["parameters"] == {}
+    assert report["error"]["quantity"] == "angle_deg"
+    law = report["tests"]["picture_frame"]["model"]["parameters"]
+    crossover = cases[0].crossover
+    assert (crossover.k1_N_mm, crossover.k3_N_mm) == (law["k1_N"], law["k3_N"])
+    assert crossover.dashpot_N_s_mm == law["c1_N_s"]
+    assert any("fitted to the other tests" in note for note in report["notes"])
+    text = (tmp_path / "out/report.html").read_text()
+    assert text.count("<section>") == 2 and (tmp_path / "out/drape_data.png").exists()
 
 
 @pytest.mark.mpi

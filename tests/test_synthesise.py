@@ -140,7 +140,8 @@ def test_a_broken_file_of_effects_is_one_line(old, new, says, tmp_path, capsys):
     assert synthesise(made, "--readings", 20, "--quiet") == 0
     assert command("diagnose", made, "--out", out, "--effects-from", path) == 2
     line = capsys.readouterr().err
-    assert line.count("\n") == 1 and str(path) in line and says in line
+    assert line.count("\n") == 1 and says in line
+    assert str(path) in line or "--effects-from" in line
     assert not out.exists()
 
 

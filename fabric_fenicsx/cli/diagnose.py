@@ -74,6 +74,7 @@ def _diagnose(
     """Rank 0 searches, which takes seconds with small systems; the others wait."""
     from mpi4py import MPI
 
+    from ..loop.effects import read_effects
     from ..loop.registry import ORDER, experiment_class
     from ..terminal import searching, summarise_diagnosis
 
@@ -85,9 +86,15 @@ def _diagnose(
     from ..solving.record import prepare_folder
 
     def search() -> dict[str, Any]:
-        tests, names = _prepared(measurements, effects, effects_from)
+        own = read_effects(effects_from) if effects_from is not None else []
+        tests = _prepared(measurements, own)
+        names = _wanted(effects, tests)
+        for experiment, _ in tests:
+            # Drapes must first be given what the other tests find.
+            if experiment.test != "drape":
+                _try_out(experiment, own)
         prepare_folder(out, MPI.COMM_SELF)
-        return _report(tests, names, out, progress)
+        return _report(tests, names, own, out, progress)
 
     with searching(quiet or comm.rank != 0) as progress:
         report = from_root(comm, search)
@@ -105,48 +112,46 @@ def _read(folders: Sequence[Path]) -> list[Measurement]:
     return [read_measurement(folder) for folder in folders]
 
 
-def _prepared(
-    measurements: Sequence[Measurement], effects: str | None, effects_from: Path | None
-) -> tuple[list[Test], list[str] | None]:
-    """The experiment of each test with its measurements, and the names of effects to try."""
-    from ..loop.effects import read_effects
+def _prepared(measurements: Sequence[Measurement], own: Sequence[Effect]) -> list[Test]:
+    """The experiment of each test with its measurements."""
     from ..loop.registry import ORDER, experiment_class
 
-    own = read_effects(effects_from) if effects_from is not None else []
     tests: list[Test] = []
     for test in ORDER:
         same = [m for m in measurements if m.test == test]
         if same:
             mine = [effect for effect in own if effect.test == test]
-            tests.append((experiment_class(test)(same, mine), same))
+            try:
+                tests.append((experiment_class(test)(same, mine), same))
+            except SolveError as error:
+                raise _unfitted(test, error) from error
     for experiment, _ in tests:
         known = [effect.name for effect in experiment.effects]
         for name in known:
             if known.count(name) > 1:
-                raise InputError(f"{effects_from}: {name}: stands twice, allowed is a new name")
-    names = _wanted(effects, tests)
-    if effects_from is not None:
-        _try_out(effects_from, own, tests)
-    return tests, names
+                raise InputError(f"--effects-from: {name}: stands twice, allowed is a new name")
+    return tests
 
 
 def _report(
     tests: Sequence[Test],
     names: Sequence[str] | None,
+    own: Sequence[Effect],
     out: Path,
     progress: Callable[[float, str], None],
 ) -> dict[str, Any]:
     """Search and write; report.json comes last."""
-    from ..loop.drape import Drape
     from ..loop.page import write_page
+    from ..loop.registry import hand_on
     from ..loop.report import combined_report, test_report, write_report
 
     parts: list[tuple[Diagnosis, dict[str, Any]]] = []
-    for number, (experiment, own) in enumerate(tests):
-        if isinstance(experiment, Drape):
-            experiment.take({d.experiment.test: d.baseline.values for d, _ in parts})
+    for number, (experiment, measurements) in enumerate(tests):
+        hand_on(experiment, [diagnosis for diagnosis, _ in parts])
+        if experiment.test == "drape":
+            _try_out(experiment, own)
         diagnosis = _search(experiment, names, _part(progress, number, len(tests)))
-        parts.append((diagnosis, test_report(diagnosis, own)))
+        parts.append((diagnosis, test_report(diagnosis, measurements)))
     report = combined_report([part for _, part in parts])
     progress(1.0, "drawing")
     try:
@@ -171,23 +176,20 @@ def _wanted(effects: str | None, tests: Sequence[Test]) -> list[str] | None:
     return names
 
 
-def _try_out(path: Path, own: Sequence[Effect], tests: Sequence[Test]) -> None:
+def _try_out(experiment: Experiment, own: Sequence[Effect]) -> None:
     """Evaluate every form of the user's own effects once: what fails there is their file's."""
-    for experiment, _ in tests:
-        start = {p.name: p.starts[0] for p in experiment.baseline}
-        for effect in experiment.effects:
-            if not any(effect.name == mine.name for mine in own):
-                continue
-            for variant in effect.variants:
-                place = f"{path}: {effect.name}, {variant.label}"
-                try:
-                    first = variant.grid(amplitudes=False)[0] | {
-                        p.name: 1e-9 for p in variant.amplitudes
-                    }
-                    experiment.predict((variant,), start | first)
-                except Exception as error:
-                    reason = " ".join(f"{type(error).__name__}: {error}".split())
-                    raise InputError(f"{place}: cannot be evaluated ({reason})") from error
+    start = {p.name: p.starts[0] for p in experiment.baseline}
+    names = [effect.name for effect in own]
+    for effect in (effect for effect in experiment.effects if effect.name in names):
+        for variant in effect.variants:
+            first = variant.grid(amplitudes=False)[0]
+            first |= {p.name: 1e-9 for p in variant.amplitudes}
+            try:
+                experiment.predict((variant,), start | first)
+            except Exception as error:
+                reason = " ".join(f"{type(error).__name__}: {error}".split())
+                place = f"--effects-from: {effect.name}, {variant.label}"
+                raise InputError(f"{place}: cannot be evaluated ({reason})") from error
 
 
 def _part(
@@ -205,4 +207,8 @@ def _search(
     try:
         return diagnose_test(experiment, names, progress)
     except SolveError as error:
-        raise FitError(f"{experiment.test}: the baseline could not be fitted ({error})") from error
+        raise _unfitted(experiment.test, error) from error
+
+
+def _unfitted(test: str, error: SolveError) -> FitError:
+    return FitError(f"{test}: the baseline could not be fitted ({error})")

@@ -61,6 +61,8 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
     figure = _figure(0.5 + 2.7 * rows)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     model = shown_model(diagnosis)
+    # Readings all over a sheet are on no line.
+    scattered = diagnosis.experiment.test == "drape"
     compared = readings.usable & ~diagnosis.outliers
     for number, axes in enumerate(panels.flat):
         if number >= len(names):
@@ -84,17 +86,24 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
         for start, end in _curves(along[own], readings.observed[own]):
             part = own[start:end]
             first = start == 0
+            curve: dict[str, Any] = {"linestyle": (0, (4, 2))}
+            if scattered:
+                curve = {"linestyle": "none", "marker": "o", "markersize": 4, "fillstyle": "none"}
             axes.plot(
                 along[part],
                 diagnosis.baseline.expected[part],
                 color=BEFORE,
-                linestyle=(0, (4, 2)),
                 label="baseline" if first else None,
+                **curve,
             )
             if model is not None:
                 fit, text = model
                 axes.plot(
-                    along[part], fit.expected[part], color=AFTER, label=text if first else None
+                    along[part],
+                    fit.expected[part],
+                    color=AFTER,
+                    label=text if first else None,
+                    **(curve if scattered else {}),
                 )
         held = bool(readings.holdout[own].any())
         axes.set_title(

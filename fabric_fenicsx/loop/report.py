@@ -111,7 +111,8 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
             }
             for m in measurements
         ],
-        "notes": list(d.notes),
+        # Not every experiment has something to say of its model.
+        "notes": [*getattr(d.experiment, "notes", ()), *d.notes],
     }
     finite: dict[str, Any] = _finite(content)
     return finite | {"headline": headline(finite)}
