@@ -144,7 +144,8 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
                     part["parameters"][name]["unit"],
                     "" if k else ", ".join(effect["rivals"]),
                 )
-        console.print(table)
+        if table.row_count:
+            console.print(table)
         error = part["error"]
         table = Table(f"error, {error['quantity']}", "before", "after", "noise")
         for kind, label in (("fit", "fitted"), ("holdout", "held out")):

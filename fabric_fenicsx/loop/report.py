@@ -111,8 +111,7 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
             }
             for m in measurements
         ],
-        # Not every experiment has something to say of its model.
-        "notes": [*getattr(d.experiment, "notes", ()), *d.notes],
+        "notes": list(d.notes),
     }
     finite: dict[str, Any] = _finite(content)
     return finite | {"headline": headline(finite)}
