@@ -13,7 +13,7 @@ from fabric_fenicsx.__main__ import main
 MEMORY = 6 << 30
 """Bytes of address space that a broken number must not reach."""
 
-PATIENCE = 120
+PATIENCE = 300
 """Seconds after which a case counts as one that hangs."""
 
 ODD = {
