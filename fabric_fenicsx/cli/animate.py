@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .results import Colour, Folder, Mirror, View, listed, opened, writable
+from .results import Colour, Folder, Hide, Mirror, View, hidden, listed, opened, writable
 
 __all__ = ["animate"]
 
@@ -23,10 +23,7 @@ def animate(
     width: Annotated[int, typer.Option("--width", min=160, max=3840, help="In pixels.")] = 800,
     colour: Colour = "shear_angle",
     side: View = "perspective",
-    hide: Annotated[
-        list[str] | None,
-        typer.Option("--hide", metavar="TOOL", help="Leave a tool out; default: holder."),
-    ] = None,
+    hide: Hide = None,
     mirror: Mirror = None,
 ) -> None:
     """Draw a run as a film, evenly in time.
@@ -41,13 +38,11 @@ def animate(
     listed("--colour", colour, COLOURS)
     listed("--view", side, VIEWS)
     results, mirror, _ = opened(folder, mirror)
-    for name in hide or []:
-        listed("--hide", name, [tool.name for tool in results.tools])
-    hidden = ["holder"] if hide is None else hide
+    left_out = hidden(hide, results)
     path = writable(out or folder / "film.gif", (".gif", ".mp4"))
     encoder(path)
     frames = [
-        (net, snapshot, [tool for tool in tools if tool.name not in hidden])
+        (net, snapshot, [tool for tool in tools if tool.name not in left_out])
         for net, snapshot, tools in results.frames(count, mirror=mirror)
     ]
     size = (2 * round(width / 2), 2 * round(width * 3 / 8))

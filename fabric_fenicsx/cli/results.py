@@ -12,7 +12,18 @@ from ..errors import InputError
 if TYPE_CHECKING:
     from ..output.results import Results
 
-__all__ = ["Colour", "Folder", "Mirror", "Time", "View", "listed", "opened", "writable"]
+__all__ = [
+    "Colour",
+    "Folder",
+    "Hide",
+    "Mirror",
+    "Time",
+    "View",
+    "hidden",
+    "listed",
+    "opened",
+    "writable",
+]
 
 Folder = Annotated[Path, typer.Argument(metavar="RESULTS", help="The folder of a run.")]
 Time = Annotated[
@@ -28,6 +39,10 @@ Mirror = Annotated[
 Colour = Annotated[
     str,
     typer.Option("--colour", metavar="NAME", help="What colours the tows, as displacement."),
+]
+Hide = Annotated[
+    list[str] | None,
+    typer.Option("--hide", metavar="TOOL", help="Leave a tool out; default: holder."),
 ]
 View = Annotated[
     str, typer.Option("--view", metavar="NAME", help="perspective, top, front or side.")
@@ -49,6 +64,17 @@ def opened(folder: Path, mirror: bool | None) -> tuple[Results, bool, str]:
     if mirror is None:
         mirror = getattr(case, "symmetry", "none") == "quarter"
     return results, mirror, (case.title if case is not None else "") or folder.name
+
+
+def hidden(hide: list[str] | None, results: Results) -> list[str]:
+    """Names of the tools that are left out.
+
+    Raises:
+        InputError: the run has no such tool.
+    """
+    for name in hide or []:
+        listed("--hide", name, [tool.name for tool in results.tools])
+    return ["holder"] if hide is None else hide
 
 
 def listed(what: str, given: str, allowed: object) -> None:

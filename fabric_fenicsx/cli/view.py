@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .results import Colour, Folder, Mirror, Time, View, listed, opened, writable
+from .results import Colour, Folder, Hide, Mirror, Time, View, hidden, listed, opened, writable
 
 __all__ = ["view"]
 
@@ -32,10 +32,7 @@ def view(
     time: Time = None,
     colour: Colour = "shear_angle",
     side: View = "perspective",
-    hide: Annotated[
-        list[str] | None,
-        typer.Option("--hide", metavar="TOOL", help="Leave a tool out; default: holder."),
-    ] = None,
+    hide: Hide = None,
     mirror: Mirror = None,
 ) -> None:
     """Draw the result of a run.
@@ -50,9 +47,7 @@ def view(
     listed("--colour", colour, SHOWN if html else COLOURS)
     listed("--view", side, VIEWS)
     results, mirror, title = opened(folder, mirror)
-    hidden = ["holder"] if hide is None else hide
-    for name in hide or []:
-        listed("--hide", name, [tool.name for tool in results.tools])
+    left_out = hidden(hide, results)
     if html:
         path = writable(out or folder / "scene.html", (".html",))
         count = FRAMES if time is None else 1
@@ -61,11 +56,11 @@ def view(
             if time is None
             else [results.at(results.nearest(time), mirror=mirror)]
         )
-        write_scene(path, frames, title=title, colour=colour, hidden=hidden)
+        write_scene(path, frames, title=title, colour=colour, hidden=left_out)
         print(path)
         return
     net, snapshot, tools = results.at(results.nearest(time), mirror=mirror)
-    shown = [tool for tool in tools if tool.name not in hidden]
+    shown = [tool for tool in tools if tool.name not in left_out]
     target: Path | None = None
     if window:
         if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
