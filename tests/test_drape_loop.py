@@ -1,10 +1,14 @@
 """Drapes traced to effects: a smooth field in place of finite elements, and, slow, with them."""
 
+from functools import cache
+from pathlib import Path
+
 from mpi4py import MPI
 
 import numpy as np
 import pytest
 import yaml
+from scipy.optimize import least_squares
 
 from fabric_fenicsx.errors import InputError, SolveError
 from fabric_fenicsx.loop.drape import OTHER_MESH, Drape, nearest_next
@@ -13,11 +17,18 @@ from fabric_fenicsx.loop.fitting import fit
 from fabric_fenicsx.loop.measurement import read_measurement
 from fabric_fenicsx.loop.report import test_report as report_of
 from fabric_fenicsx.loop.search import diagnose_test
-from fabric_fenicsx.loop.shear_field import ShearField, ShearLaw, drape_case, hermite_weights
+from fabric_fenicsx.loop.shear_field import (
+    ShearField,
+    ShearLaw,
+    drape_case,
+    hermite_weights,
+    solved_field,
+)
 from fabric_fenicsx.rigs.cases import DrapeCase
-from fabric_fenicsx.rigs.common import Session
+from fabric_fenicsx.rigs.common import Session, control
 from fabric_fenicsx.rigs.drape import build
 from fabric_fenicsx.solving.parts import ContactLaw
+from fabric_fenicsx.solving.simulation import simulate
 
 RIG = {
     "punch_radius_mm": 76.2,
@@ -325,3 +336,98 @@ def test_a_tool_without_friction_does_not_rub():
     names = {term.name for term in model.contacts.terms}
     assert names == {"punch", "die", "die friction", "holder", "holder friction"}
     assert not ContactLaw(0.5, 0.5).rubs("die")
+
+
+@cache
+def _solved(text):
+    return solved_field(DrapeCase.model_validate_json(text))
+
+
+def solved(case):
+    """The finite elements, once for each case."""
+    return _solved(case.model_dump_json())
+
+
+def changed(measurement, **changes):
+    """The field of the measured drape with other keys, as it is read: waves and all."""
+    dotted = {name.replace("__", "."): value for name, value in changes.items()}
+    return solved(drape_case(measurement, ShearLaw(), 60000.0, dotted))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "changes", "parameter", "size"),
+    [
+        ("tool_friction", {"contact__friction": 0.3}, "mu", 0.3),
+        (
+            "holder_pressure",
+            {
+                "holder_force_N": 100.0,
+                "contact__friction": 0.2,
+                "contact__frictionless": ["punch"],
+            },
+            "holder_force_N",
+            100.0,
+        ),
+    ],
+)
+def test_friction_in_the_whole_model_is_found(tmp_path, name, changes, parameter, size):
+    """Either is the other's rival: both stretch the tows, and more of it soon changes little."""
+    x, y = marks(count=100)
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    truth = changed(written(folder, x, y, x * 0.0 + 80.0), **changes)
+    angles = 90.0 - np.degrees(np.abs(truth.at(x, y)[0]))
+    angles += np.random.default_rng(1).normal(0.0, 1.0, len(x))
+    drape = Drape([written(tmp_path, x, y, angles, held=20)], solve=solved)
+    report = report_of(diagnose_test(drape), drape.measurements)
+    assert report["verdict"] == "effect_found"
+    (effect,) = report["effects"]
+    assert name in (effect["name"], *effect["rivals"])
+    assert report["error"]["after"]["holdout"] < report["error"]["before"]["holdout"]
+    if effect["name"] == name:
+        assert abs(effect["parameters"][parameter] - size) < 4.0 * effect["std"][parameter]
+
+
+@pytest.mark.slow
+def test_an_offset_in_the_whole_model_is_a_shift_if_friction_holds_the_sheet(tmp_path):
+    """Without friction the sheet slides, see loop/drape_effects.py."""
+    case = DrapeCase(
+        test="drape",
+        sheet={"width_mm": 288, "length_mm": 288},
+        contact={"friction": 0.1},
+        symmetry="none",
+        punch_offset_x_mm=6.0,
+        punch_offset_y_mm=-4.0,
+    )
+    session = Session(tmp_path, MPI.COMM_SELF, Path(), 0.0)
+    model = build(case, session)
+    outcome = simulate(
+        model,
+        tmp_path,
+        test="drape",
+        end=case.duration_s,
+        control=control(case.solver, case.edge_radius_mm / 2.0),
+        force_tolerance=case.solver.force_tolerance_N,
+        iteration_limit=case.solver.iteration_limit,
+    )
+    assert outcome.completed
+    x, y = model.net.points[model.net.crossings].mean(axis=1)[:, :2].T
+    gamma = np.zeros((24, 24))
+    place = np.searchsorted(SIDE, np.round(x, 6)), np.searchsorted(SIDE, np.round(y, 6))
+    gamma[place] = outcome.last.shear_angle
+    moved = np.abs(ShearField(SIDE, SIDE, gamma).filtered().gamma[place])
+    centred = case.model_copy(
+        update={"symmetry": "quarter", "punch_offset_x_mm": 0.0, "punch_offset_y_mm": 0.0}
+    )
+    field = solved(centred).filtered()
+
+    def off(dx, dy):
+        return np.degrees(np.abs(field.at(x - dx, y - dy)[0]) - moved)
+
+    def rms(values):
+        return float(np.sqrt(np.mean(values**2)))
+
+    assert rms(off(6.0, -4.0)) < 1.3 < 2.0 < rms(off(0.0, 0.0))
+    best = least_squares(lambda p: off(*p), [0.0, 0.0]).x
+    assert best == pytest.approx([6.0, -4.0], abs=1.0)

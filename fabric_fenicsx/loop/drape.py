@@ -126,7 +126,7 @@ class Drape:
     # Data ---------------------------------------------------------------------------------
 
     @cached_property
-    def _sigma(self) -> Array:
+    def sigma(self) -> Array:
         """One sigma of every reading [degrees], NaN where it is not given, (n,)."""
         parts: list[Array] = []
         for m in self.measurements:
@@ -138,9 +138,9 @@ class Drape:
     @cached_property
     def noise(self) -> float | None:
         """Root mean square of the given sigmas [degrees]; None unless all are given."""
-        if np.isnan(self._sigma).any():
+        if np.isnan(self.sigma).any():
             return None
-        return float(np.sqrt(np.mean(self._sigma**2)))
+        return float(np.sqrt(np.mean(self.sigma**2)))
 
     @cached_property
     def _order(self) -> list[npt.NDArray[np.int64]]:
@@ -191,7 +191,7 @@ class Drape:
             },
             row=np.concatenate(self._order),
         )
-        sigma = self._sigma
+        sigma = self.sigma
         noise = self.noise
         if noise is None:
             residual = angle - self.predict((), {})[0]
@@ -214,7 +214,7 @@ class Drape:
         too small; and what both meshes have in common (the fabric's laws, the size of the sheet,
         the spacing) they cannot show.
         """
-        scatter = np.zeros(len(self._sigma))
+        scatter = np.zeros(len(self.sigma))
         for sheet in self._sheets:
             fine = {"sheet.subdivisions": OTHER_MESH}
             mean = self._field(sheet.measurement, {}).gamma
@@ -256,7 +256,7 @@ class Drape:
         mine = [v for v in variants if isinstance(v, DrapeVariant)]
         mine.sort(key=lambda v: place.get(id(v), len(place)))
         names = [p.name for v in mine for p in v.parameters]
-        expected = np.zeros(len(self._sigma))
+        expected = np.zeros(len(self.sigma))
         slopes = {name: np.zeros(len(expected)) for name in names}
         for sheet in self._sheets:
             at = self._places(sheet, mine, values)

@@ -1,8 +1,11 @@
 """Effects that a drape shows.
 
 Those of place cost no further solution: the tools are bodies of revolution, so that the sheet that
-was moved or turned under them has the aligned sheet's angles in other places. Exact for a turn; for
-an offset as long as the sheet's edge is no nearer to the hole than it matters.
+was moved or turned under them has the aligned sheet's angles in other places. That is exact for a
+turn. For an offset the sheet must be large and something must hold it: of a run of the whole demo
+with the punch at (6, −4) mm and friction 0.1 the best shift is (5.7, −4.2) mm, 1.0° rms away;
+without any friction the sheet slides as it is drawn, and the best shift is (11.8, −5.4) mm, 2.4°
+rms away. So an offset found on oiled tools may be up to twice the one there is.
 """
 
 from __future__ import annotations
