@@ -102,12 +102,16 @@ class FrameVariant(Variant):
             true displacement at the reading before).
         reading: what the load cell adds [N] at the time t [s].
         remembers_travel: ``travel`` depends on ``past``.
+        each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
+            has. Those of a holdout run can only come from that run: its error is then what is
+            left after them.
     """
 
     laws: Callable[[Values], tuple[Any, ...]] | None = None
     travel: Callable[[Values, Any, Any], Any] | None = None
     reading: Callable[[Values, Any], Any] | None = None
     remembers_travel: bool = False
+    each_run: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,7 +89,7 @@ class PictureFrame:
             "rate": float(np.abs(rate).max()),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
-        self.effects = [_scaled(e, shares) for e in (*PICTURE_FRAME_EFFECTS, *own)]
+        self.effects = [self._with_runs(_scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
 
     def _leave_out_uncertain(self, doubt: Array) -> None:
         """Leave out readings whose rate is so uncertain [rad/s] that the dashpot's force is.
@@ -152,7 +152,7 @@ class PictureFrame:
                 slopes[p] = slopes.get(p, 0.0) + m.value * slope
         for v in mine:
             if v.reading is not None:
-                added = self._reading(v, values)
+                added = self._each_run(v, values, force) if v.each_run else self._reading(v, values)
                 force = force + added.value
                 for p, slope in added.slopes.items():
                     slopes[p] = slopes.get(p, 0.0) + slope
@@ -240,6 +240,55 @@ class PictureFrame:
             added = variant.reading(marched.at, marched.at["time"])
             self._compiled[key] = marched.define({"force": added}, {})
         return self._compiled[key](self._points, values)["force"]
+
+    def _with_runs(self, effect: Effect) -> Effect:
+        """Parameters of their own for each run that is fitted, where a form wants them."""
+        runs = np.unique(self.readings.run[self.readings.fit])
+
+        def expanded(v: Variant) -> Variant:
+            if not (isinstance(v, FrameVariant) and v.each_run):
+                return v
+            own = tuple(replace(p, name=_of_run(p, run)) for run in runs for p in v.parameters)
+            return replace(v, parameters=own)
+
+        kept = [v for v in effect.variants if len(runs) > 1 or not getattr(v, "each_run", False)]
+        return replace(effect, variants=tuple(expanded(v) for v in kept))
+
+    def _each_run(
+        self, variant: FrameVariant, values: Mapping[str, float], force: Array
+    ) -> Varying:
+        """What the load cell adds; of a holdout run, what fits best to what is left there."""
+        assert variant.reading is not None
+        names = dict.fromkeys(p.name.split("_", 1)[1] for p in variant.parameters)
+        unit = Marched(("time",), tuple(names))
+        added = variant.reading(unit.at, unit.at["time"])
+        slopes = unit.define({"force": added}, {})(self._points, dict.fromkeys(names, 0.0))
+        columns = slopes["force"].slopes
+        shape = self._points["time"].value.shape
+        total, found = np.zeros(shape), {}
+        left = self.readings.observed - self._at_readings(force)
+        for run in range(shape[1]):
+            rows = self.readings.run == run
+            own = {n: np.broadcast_to(c, shape)[:, run] for n, c in columns.items()}
+            if f"run{run + 1}_{next(iter(names))}" in values:
+                for n, column in own.items():
+                    name = f"run{run + 1}_{n}"
+                    total[:, run] += values[name] * column
+                    found[name] = np.zeros(shape)
+                    found[name][:, run] = column
+            else:
+                rows = rows & self.readings.usable
+                J = np.column_stack(
+                    [self._at_readings(np.broadcast_to(c, shape))[rows] for c in columns.values()]
+                )
+                zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
+                total[:, run] = sum(z * c for z, c in zip(zero, own.values(), strict=True))
+        return Varying(total, found)
+
+
+def _of_run(p: Parameter, run: int) -> str:
+    """Name of a parameter in one run, counted from 1."""
+    return f"run{run + 1}_{p.name}"
 
 
 def _remembered(marched: Marched, number: int, name: str) -> Any:

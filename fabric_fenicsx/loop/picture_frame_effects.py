@@ -242,6 +242,18 @@ PICTURE_FRAME_EFFECTS = (
                 (OFFSET, DRIFT),
                 reading=lambda p, t: p["offset_N"] + p["drift_N_s"] * t,
             ),
+            FrameVariant(
+                "offset of each run",
+                (OFFSET,),
+                reading=lambda p, t: p["offset_N"],
+                each_run=True,
+            ),
+            FrameVariant(
+                "offset and drift of each run",
+                (OFFSET, DRIFT),
+                reading=lambda p, t: p["offset_N"] + p["drift_N_s"] * t,
+                each_run=True,
+            ),
         ),
     ),
 )

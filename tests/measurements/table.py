@@ -1,0 +1,132 @@
+"""The sixty sets diagnosed, as a table: what was put in, what was said, and the errors.
+
+    python tests/measurements/table.py SEED [SEED ...] [--only TEXT]
+
+An answer is right where the verdict is, and where the names are, each itself or as one of the
+rivals that were named with it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from fabric_fenicsx.errors import SolveError
+from fabric_fenicsx.loop.measurement import read_measurement
+from fabric_fenicsx.loop.registry import experiment_class
+from fabric_fenicsx.loop.search import diagnose_test
+from measurements.sets import sixty
+from measurements.writing import Truth
+
+
+@dataclass(frozen=True)
+class Row:
+    """One set: `before` and `after` are held-out errors over the noise put in."""
+
+    seed: int
+    name: str
+    truth: Truth
+    verdict: str
+    effects: tuple[str, ...]
+    rivals: dict[str, list[str]]
+    before: float
+    after: float
+
+    @property
+    def right(self) -> bool:
+        if self.verdict != self.truth.verdict:
+            return False
+        choices = product(*[(name, *self.rivals[name]) for name in self.effects])
+        return self.verdict != "effect_found" or any(
+            frozenset(choice) in self.truth.acceptable for choice in choices
+        )
+
+    @property
+    def alarm(self) -> bool:
+        """An effect named, or something unexplained claimed, where there is nothing."""
+        return self.truth.verdict == "no_effect" and self.verdict != "no_effect"
+
+
+def rows(seeds: list[int], only: str = "") -> Iterator[Row]:
+    """Write, diagnose and judge the sets of some seeds."""
+    for seed in seeds:
+        for recipe in sixty(seed):
+            if only not in recipe.name:
+                continue
+            with tempfile.TemporaryDirectory() as folder:
+                truth = recipe(Path(folder) / "set")
+                measurement = read_measurement(Path(folder) / "set")
+                try:
+                    found = diagnose_test(experiment_class(measurement.test)([measurement]))
+                except SolveError:
+                    nothing = (float("nan"), float("nan"))
+                    yield Row(seed, recipe.name, truth, "not fitted", (), {}, *nothing)
+                    continue
+            yield Row(
+                seed,
+                recipe.name,
+                truth,
+                found.verdict,
+                tuple(effect.name for effect in found.effects),
+                found.rivals,
+                found.holdout_before / truth.noise,
+                found.holdout_after / truth.noise,
+            )
+
+
+def line(row: Row) -> str:
+    """A row of the table in Markdown."""
+    put = " + ".join(effect["name"] for effect in row.truth.effects) or "nothing"
+    said = " + ".join(row.effects) or row.verdict
+    rivals = sorted({name for names in row.rivals.values() for name in names})
+    cells = (
+        str(row.seed),
+        row.name,
+        put,
+        said,
+        ", ".join(rivals),
+        f"{row.before:.2f}",
+        f"{row.after:.2f}",
+        "right" if row.right else "WRONG",
+    )
+    return "| " + " | ".join(cells) + " |"
+
+
+def summary(table: list[Row]) -> str:
+    """What the table comes to."""
+    none = [row for row in table if row.truth.verdict == "no_effect"]
+    found = [row for row in table if row.verdict == "effect_found"]
+    over = [row for row in found if row.after > 1.15]
+    return (
+        f"{sum(row.right for row in table)} of {len(table)} right; "
+        f"false alarms: {sum(row.alarm for row in none)} of {len(none)}; "
+        f"held-out error after over noise: median {np.median([r.after for r in found]):.2f}, "
+        f"above 1.15 in {len(over)} of {len(found)}"
+    )
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("seeds", type=int, nargs="+")
+    parser.add_argument("--only", default="")
+    given = parser.parse_args()
+    print("| seed | set | put in | said | rivals | before | after | |\n|" + "---|" * 8)
+    table = []
+    for row in rows(given.seeds, given.only):
+        table.append(row)
+        print(line(row), flush=True)
+    print(f"\n{summary(table)}")
+
+
+if __name__ == "__main__":
+    main()
