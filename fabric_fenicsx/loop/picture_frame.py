@@ -251,8 +251,14 @@ class PictureFrame:
             own = tuple(replace(p, name=_of_run(p, run)) for run in runs for p in v.parameters)
             return replace(v, parameters=own)
 
-        kept = [v for v in effect.variants if len(runs) > 1 or not getattr(v, "each_run", False)]
-        return replace(effect, variants=tuple(expanded(v) for v in kept))
+        each = [v for v in effect.variants if getattr(v, "each_run", False)]
+        shared = [v for v in effect.variants if v not in each]
+        if len(self.readings.names) == 1:
+            each = []
+        elif each and len(runs) == 1:
+            # One fitted run cannot tell the two apart: nothing is claimed of the other runs.
+            shared = [v for v in shared if getattr(v, "reading", None) is None]
+        return replace(effect, variants=tuple(expanded(v) for v in (*shared, *each)))
 
     def _each_run(
         self, variant: FrameVariant, values: Mapping[str, float], force: Array

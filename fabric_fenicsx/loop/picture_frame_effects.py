@@ -243,6 +243,12 @@ PICTURE_FRAME_EFFECTS = (
                 reading=lambda p, t: p["offset_N"] + p["drift_N_s"] * t,
             ),
             FrameVariant(
+                "drift of each run",
+                (DRIFT,),
+                reading=lambda p, t: p["drift_N_s"] * t,
+                each_run=True,
+            ),
+            FrameVariant(
                 "offset of each run",
                 (OFFSET,),
                 reading=lambda p, t: p["offset_N"],
