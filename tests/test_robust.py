@@ -50,14 +50,21 @@ def begun(case, folder, *, ranks=1, steps=3):
 
 @pytest.mark.parametrize(("ranks", "code"), [(1, {130}), (2, {1, 130})])
 def test_interrupt_keeps_the_steps_and_says_how_to_go_on(case, tmp_path, ranks, code):
-    """Ctrl-C goes to the whole group. Of several ranks, mpirun's own exit code is 1 or 130."""
+    """Ctrl-C goes to the whole group. Of several ranks, mpirun's own exit code is 1 or 130, and
+    Open MPI 5 may kill them before they have spoken; the steps are whole all the same.
+    """
     process = begun(case, tmp_path / "results", ranks=ranks)
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode in code
     assert "Traceback" not in said
-    (line,) = [line for line in own_lines(said) if line.startswith("interrupted: ")]
-    assert "accepted steps are in" in line and "--resume" in line
+    lines = [line for line in own_lines(said) if line.startswith("interrupted: ")]
+    assert len(lines) == 1 or (ranks > 1 and not lines)
+    for line in lines:
+        assert "accepted steps are in" in line and "--resume" in line
+    for path in (tmp_path / "results" / "steps").iterdir():
+        with np.load(path) as whole:
+            assert "u" in whole.files
     assert not list(tmp_path.rglob("*partial*"))
 
 
