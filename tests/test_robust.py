@@ -50,7 +50,8 @@ def begun(case, folder, *, ranks=1, steps=3):
 
 @pytest.mark.parametrize(("ranks", "code"), [(1, {130}), (2, {1, 130})])
 def test_interrupt_keeps_the_steps_and_says_how_to_go_on(case, tmp_path, ranks, code):
-    """Ctrl-C goes to the whole group. Of several ranks, mpirun's own exit code is 1 or 130, and
+    """Ctrl-C goes to the whole group; of several ranks, mpirun's own exit code is 1 or 130.
+
     Open MPI 5 may kill them before they have spoken; the steps are whole all the same.
     """
     process = begun(case, tmp_path / "results", ranks=ranks)
