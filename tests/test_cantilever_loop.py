@@ -150,11 +150,27 @@ def test_derivatives(exact, exact_without_arc, case, arc):
         assert np.abs(slopes[name] - difference).max() < 1e-4 * scale, name
 
 
-def test_two_effects_at_once(exact):
-    # Derivatives where the moment, the turn of the root and B depend on each other.
-    names = [("residual_curvature", "constant"), ("clamp_compliance", "linear")]
-    variants = tuple(form(exact, n)[0] for n in names)
-    values = parameters({"kappa0_1_mm": 1e-3, "compliance_rad_per_N": 20.0 / B})
+PAIRS = {
+    "curved, compliant": (
+        ("curved up", "compliance"),
+        {"curvature": 1.6e-3, "compliance": 20.0 / B},
+    ),
+    # The law is that of the curvature beyond that of the unloaded strip.
+    "curved, softening": (
+        ("curved down", "tanh"),
+        {"curvature": -1.6e-3, "law": ("tanh", CRITICAL, REST)},
+    ),
+    "tilted, softening": (("tilt", "tanh"), {"tilt": -0.1, "law": ("tanh", CRITICAL, REST)}),
+}
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_two_effects_at_once(exact, pair):
+    cases, effect = PAIRS[pair]
+    variants = tuple(form(exact, CASES[case][0])[0] for case in cases)
+    values = parameters({})
+    for case in cases:
+        values |= CASES[case][1]
     expected, slopes = exact.predict(variants, values)
     for name, value in values.items():
         above, below = (
@@ -163,7 +179,7 @@ def test_two_effects_at_once(exact):
         )
         difference = (above - below) / (2e-4 * value)
         assert slopes[name] == pytest.approx(difference, abs=1e-4 * np.abs(difference).max())
-    s, _, z, _ = elastica(curvature=1e-3, compliance=20.0 / B)
+    s, _, z, _ = elastica(**effect)
     rows = exact.readings.run == 0
     at = exact.readings.covariates["arc length [mm]"][rows]
     assert expected[rows] == pytest.approx(CubicSpline(s, z)(at), abs=0.02)

@@ -281,19 +281,22 @@ class Cantilever:
         return at
 
     def _laws(self, variants: Sequence[StripVariant]) -> Laws:
+        def those(result: str, of: str) -> list[Marched]:
+            return [self._law(v, result, of) for v in variants if getattr(v, result) is not None]
+
         return Laws(
-            moments=[self._law(v, "moment", "kappa") for v in variants if v.moment is not None],
-            turns=[self._law(v, "turn", "root") for v in variants if v.slope is not None],
+            moments=those("moment", "kappa"),
+            unloaded=those("unloaded", "kappa"),
+            slopes=those("slope", "root"),
         )
 
     def _law(self, variant: StripVariant, result: str, of: str) -> Marched:
-        """A variant's expression, with its derivatives."""
-        expression = variant.moment if result == "moment" else variant.slope
+        """One of a variant's expressions, with its derivatives."""
         key = (id(variant), result)
         if key not in self._compiled:
-            assert expression is not None
             law = Marched((of,), ("B", *(p.name for p in variant.parameters)))
-            self._compiled[key] = law.define({result: expression(law.at, law.at[of])}, {})
+            given = (law.at,) if result == "unloaded" else (law.at, law.at[of])
+            self._compiled[key] = law.define({result: getattr(variant, result)(*given)}, {})
         return self._compiled[key]
 
 

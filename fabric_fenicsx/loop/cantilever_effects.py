@@ -56,7 +56,7 @@ CANTILEVER_EFFECTS = (
                         "kappa0_1_mm", amplitude=True, meaning="curvature unloaded, up positive"
                     ),
                 ),
-                moment=lambda p, kappa: -p["B"] * p["kappa0_1_mm"],
+                unloaded=lambda p: p["kappa0_1_mm"],
             ),
         ),
     ),

@@ -120,10 +120,12 @@ class StripVariant(Variant):
 
     Attributes:
         moment: bending moment per width [N mm/mm] added to B κ, of the curvature κ [1/mm].
+        unloaded: curvature of the unloaded strip [1/mm]; κ is what exceeds it.
         slope: turn of the root [rad], of the moment per width there [N mm/mm].
     """
 
     moment: Callable[[Values, Any], Any] | None = None
+    unloaded: Callable[[Values], Any] | None = None
     slope: Callable[[Values, Any], Any] | None = None
 
 

@@ -56,12 +56,20 @@ class Laws:
     """What effects add to a strip.
 
     Attributes:
-        moments: of the curvature ``kappa`` [1/mm] and ``B`` [N mm], the moment per width [N].
-        turns: of the root's moment per width ``root`` [N], the turn of the root [rad].
+        moments: of the curvature ``kappa`` beyond that unloaded [1/mm] and of ``B`` [N mm], the
+            ``moment`` per width [N].
+        unloaded: the curvature ``unloaded`` [1/mm].
+        slopes: of the root's moment per width ``root`` [N], the ``slope`` of the root [rad].
     """
 
     moments: Sequence[Marched] = ()
-    turns: Sequence[Marched] = ()
+    unloaded: Sequence[Marched] = ()
+    slopes: Sequence[Marched] = ()
+
+    @property
+    def bend(self) -> bool:
+        """Whether there is an added moment."""
+        return bool(self.moments or self.unloaded)
 
 
 NONE = Laws()
@@ -190,7 +198,7 @@ class HangingTow:
         ]
 
     def _refresh(self) -> None:
-        if self._laws.moments:
+        if self._laws.bend:
             added = self._moments(self._curvature())
             # About d2, to the right of the tow, bending is positive downwards.
             self._moment.x.array[self._cells] = -self._spacing * added.value
@@ -205,13 +213,25 @@ class HangingTow:
         return -self.model.system.section_forces()[:, 4] / stiffness
 
     def _moments(self, kappa: Array) -> Varying:
-        """Added moment per width [N], (n_cells,), with derivatives in kappa, B and parameters."""
-        given = {"kappa": Varying(kappa, {"kappa": np.ones_like(kappa)})}
-        return _sum(law(given, self._values)["moment"] for law in self._laws.moments)
+        """Added moment per width [N], (n_cells,), with derivatives in kappa, B and parameters.
+
+        It is -B κ0 + Σ m(κ - κ0): added to B κ, the law is that of what exceeds κ0.
+        """
+        total = Varying(kappa, {"kappa": np.ones_like(kappa)})
+        at_rest = _sum(
+            law({"kappa": total}, self._values)["unloaded"] for law in self._laws.unloaded
+        )
+        back = {name: -slope for name, slope in at_rest.slopes.items()}
+        beyond = {"kappa": Varying(kappa - at_rest.value, {**total.slopes, **back})}
+        B = self._values["B"]
+        shift = {name: B * slope for name, slope in back.items()}
+        shift["B"] = shift.get("B", 0.0) - at_rest.value
+        own = (law(beyond, self._values)["moment"] for law in self._laws.moments)
+        return _sum((Varying(-B * at_rest.value, shift), *own))
 
     def _turn(self, root: float) -> Varying:
         given = {"root": Varying(np.array(root), {"root": np.array(1.0)})}
-        return _sum(law(given, self._values)["turn"] for law in self._laws.turns)
+        return _sum(law(given, self._values)["slope"] for law in self._laws.slopes)
 
     # Balance ------------------------------------------------------------------------------
 
@@ -313,7 +333,7 @@ class HangingTow:
             elif name != "kappa":
                 forces[name] = -self._work(slope)
         slopes = {name: solve(force) for name, force in forces.items()}
-        return self._with_turn(slopes, solve) if self._laws.turns else slopes
+        return self._with_turn(slopes, solve) if self._laws.slopes else slopes
 
     def _with_turn(
         self, held: dict[str, Array], solve: Callable[[Array], Array]
@@ -334,7 +354,7 @@ class HangingTow:
 
     def _work(self, moment: Any) -> Array:
         """Nodal forces of the added term for moments per width in the cells, (n, 6)."""
-        if not self._laws.moments:
+        if not self._laws.bend:
             return np.zeros((len(self.arc), 6))
         kept = self._moment.x.array.copy()
         self._moment.x.array[self._cells] = -self._spacing * moment
