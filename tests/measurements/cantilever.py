@@ -61,7 +61,8 @@ def _curvature(strip: Strip) -> Callable[[np.ndarray, float], np.ndarray]:
     """Elastic curvature [1/mm] as a function of moment and place; the law read backwards."""
     if strip.law is not None:
         critical = strip.law[1]
-        table = np.sinh(np.linspace(0, 9, 1500)) / 100
+        # Up to 2000 critical curvatures: a strip that all but folds at the clamp has hundreds.
+        table = np.sinh(np.linspace(0, 13, 2200)) / 100
         moments = moment_ratio(strip.law, table)
 
     def curvature(moment: np.ndarray, s: float) -> np.ndarray:
