@@ -12,10 +12,10 @@ from ..errors import FitError, InputError, SolveError
 from .collective import collective, from_root
 
 if TYPE_CHECKING:
+    from ..loop.diagnosis import Diagnosis
     from ..loop.effects import Effect
     from ..loop.experiment import Experiment
     from ..loop.measurement import Measurement
-    from ..loop.search import Diagnosis
 
 __all__ = ["diagnose"]
 

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from .diagnosis import Diagnosis
 from .fitting import Fit
-from .search import Diagnosis
 
 __all__ = ["candidates_figure", "data_figure", "quantity_label", "residual_figure", "shown_model"]
 

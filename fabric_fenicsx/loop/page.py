@@ -17,9 +17,9 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from .. import __version__
+from .diagnosis import Diagnosis
 from .figures import candidates_figure, data_figure, residual_figure, shown_model
 from .report import parameter_unit
-from .search import Diagnosis
 
 __all__ = ["write_page"]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..rigs.keys import one_of
-from .search import Diagnosis
+from .diagnosis import Diagnosis
 
 __all__ = ["ORDER", "experiment_class", "hand_on"]
 

@@ -18,10 +18,10 @@ import numpy as np
 
 from ..rigs.keys import UNITS, one_of
 from .advice import further_test
+from .diagnosis import Diagnosis
 from .effects import Effect, Parameter, Variant
 from .fitting import Fit, parameters_of
 from .measurement import Measurement
-from .search import Diagnosis
 
 __all__ = ["SCHEMA", "combined_report", "headline", "parameter_unit", "test_report", "write_report"]
 

@@ -11,26 +11,25 @@ What is accepted must leave noise in the fitted readings and bring the held-out 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from itertools import combinations
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
 from ..errors import SolveError
-from .effects import Effect, Variant
+from .diagnosis import Candidate, Diagnosis, Verdict
+from .effects import Effect
 from .experiment import Experiment
-from .fitting import Fit, fit, fit_from_grid, orthogonal_to, signatures, weighted, without
+from .fitting import Fit, fit, fit_from_grid, without
 from .noise import Whiteness, estimated_noise, lone, spikes, whiteness
+from .scores import score_tests
 
-__all__ = ["Candidate", "Diagnosis", "diagnose_test"]
+__all__ = ["diagnose_test"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Model = tuple[Fit, tuple[Effect, ...]]
-Verdict = Literal["no_effect", "effect_found", "unexplained"]
 
 #: Probability of a score by chance, over all candidates together, below which it is followed.
 ALARM = 0.01
@@ -51,64 +50,6 @@ READ = 0.005
 MOST = 2
 #: Effects whose pairs with every other are tried where no single one explains the data.
 FIRST = 3
-
-
-@dataclass(slots=True)
-class Candidate:
-    """An effect that was tried by itself.
-
-    Attributes:
-        effect: which.
-        score: its largest score over its forms, in units of noise².
-        p_value: of that score, over all candidates that were tried.
-        fit: the model with its best form; None where it has no solution.
-        holdout: held-out error of that model.
-    """
-
-    effect: Effect
-    score: float
-    p_value: float
-    fit: Fit | None = None
-    holdout: float = float("nan")
-
-
-@dataclass(slots=True)
-class Diagnosis:
-    """What was found.
-
-    Attributes:
-        experiment: the test.
-        verdict: what is said in the end.
-        noise, noise_source: sigma of a reading and where it comes from.
-        baseline: the fitted baseline.
-        final: the fitted model that is reported; the baseline where nothing was added.
-        best: the model that came nearest, where that is not ``final``.
-        effects: of ``final``, strongest first.
-        rivals: by effect, others that this data cannot tell from it.
-        candidates: every effect tried.
-        holdout_before, holdout_after: held-out errors.
-        holdout_source: how they were come by.
-        white_before, white_after: tests of the residuals.
-        outliers: readings that were left out, (n,).
-    """
-
-    experiment: Experiment
-    verdict: Verdict
-    noise: float
-    noise_source: str
-    baseline: Fit
-    final: Fit
-    best: Fit | None
-    effects: tuple[Effect, ...]
-    rivals: dict[str, list[str]]
-    candidates: list[Candidate]
-    holdout_before: float
-    holdout_after: float
-    holdout_source: str
-    white_before: Whiteness
-    white_after: Whiteness
-    outliers: Flags
-    notes: list[str] = field(default_factory=list)
 
 
 def diagnose_test(
@@ -140,7 +81,7 @@ class _Search:
     ) -> None:
         self.experiment, self.progress = experiment, progress
         self.readings = experiment.readings
-        self.tried = [e for e in experiment.effects if names is None or e.name in names]
+        self.effects = [e for e in experiment.effects if names is None or e.name in names]
         start = {p.name: p.starts[0] for p in experiment.baseline}
         self.outliers = np.zeros(len(self.readings.observed), dtype=bool)
         self.baseline = fit(experiment, (), start, self.readings.fit)
@@ -223,54 +164,22 @@ class _Search:
 
     def _tried(self) -> tuple[list[Candidate], list[Candidate]]:
         """Every effect by itself; then those that have a solution, the best first."""
-        candidates = self._scores()
+        self.progress(0.0, "score tests")
+        base, noise = self.baseline, self.noise
+        candidates = [
+            Candidate(effect, *result)
+            for effect, result in zip(
+                self.effects,
+                score_tests(self.experiment, base, noise, self.effects),
+                strict=True,
+            )
+        ]
         for k, candidate in enumerate(candidates):
             self.progress(0.1 + 0.5 * k / len(candidates), f"fit {candidate.effect.name}")
             candidate.fit = self._best_variant(self.baseline, candidate.effect)
         singles = [c for c in candidates if c.fit is not None]
         singles.sort(key=lambda c: self._criterion(c.fit))
         return candidates, singles
-
-    # Scores -------------------------------------------------------------------------------
-
-    def _scores(self) -> list[Candidate]:
-        """Score tests at zero amplitude, corrected for the number of signatures that are tried."""
-        rows, base = self.rows, self.baseline
-        r = (base.residual * base.weight)[rows]
-        found: list[tuple[Effect, float, float]] = []
-        count = 0
-        for k, effect in enumerate(self.tried):
-            self.progress(0.1 * k / len(self.tried), f"score {effect.name}")
-            best, smallest = 0.0, 1.0
-            for variant in effect.variants:
-                for one in signatures(self.experiment, base, variant, amplitudes=False):
-                    count += 1
-                    J = weighted(one.slopes, base.values, rows, base.weight)
-                    amplitudes = [p.name for p in variant.amplitudes]
-                    own = weighted(one.slopes, amplitudes, rows, base.weight)
-                    score, p_value = self._score(r, J, own, variant)
-                    if p_value < smallest or best == 0.0:
-                        best, smallest = max(best, score), min(smallest, p_value)
-            found.append((effect, best, smallest))
-        return [Candidate(e, score, min(1.0, p * count)) for e, score, p in found]
-
-    def _score(self, r: Array, J: Array, own: Array, variant: Variant) -> tuple[float, float]:
-        left = orthogonal_to(J, own)
-        # What the baseline imitates to round-off has no signature of its own.
-        seen = np.linalg.norm(left, axis=0) > 1e-7 * np.linalg.norm(own, axis=0)
-        left = left[:, seen]
-        if left.shape[1] == 0:
-            return 0.0, 1.0
-        left /= np.linalg.norm(left, axis=0)
-        if left.shape[1] == 1:
-            z = float(left[:, 0] @ r) / self.noise
-            amplitude = next(p for p, kept in zip(variant.amplitudes, seen, strict=True) if kept)
-            if amplitude.one_sided and z < 0.0:
-                return 0.0, 1.0
-            return z * z, float(chi2.sf(z * z, 1))
-        part = np.linalg.lstsq(left, r, rcond=1e-8)[0]
-        score = float(np.sum((left @ part) ** 2)) / self.noise**2
-        return score, float(chi2.sf(score, left.shape[1]))
 
     # Fits ---------------------------------------------------------------------------------
 

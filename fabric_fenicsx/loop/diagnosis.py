@@ -1,0 +1,77 @@
+"""What a diagnosis says: the verdict, the models before and after, the candidates, the rivals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from .effects import Effect
+from .experiment import Experiment
+from .fitting import Fit
+from .noise import Whiteness
+
+__all__ = ["Candidate", "Diagnosis", "Verdict"]
+
+Flags = npt.NDArray[np.bool_]
+Verdict = Literal["no_effect", "effect_found", "unexplained"]
+
+
+@dataclass(slots=True)
+class Candidate:
+    """An effect that was tried by itself.
+
+    Attributes:
+        effect: which.
+        score: its largest score over its forms, in units of noise².
+        p_value: of that score, over all candidates that were tried.
+        fit: the model with its best form; None where it has no solution.
+        holdout: held-out error of that model.
+    """
+
+    effect: Effect
+    score: float
+    p_value: float
+    fit: Fit | None = None
+    holdout: float = float("nan")
+
+
+@dataclass(slots=True)
+class Diagnosis:
+    """What was found.
+
+    Attributes:
+        experiment: the test.
+        verdict: what is said in the end.
+        noise, noise_source: sigma of a reading and where it comes from.
+        baseline: the fitted baseline.
+        final: the fitted model that is reported; the baseline where nothing was added.
+        best: the model that came nearest, where that is not ``final``.
+        effects: of ``final``, strongest first.
+        rivals: by effect, others that this data cannot tell from it.
+        candidates: every effect tried.
+        holdout_before, holdout_after: held-out errors.
+        holdout_source: how they were come by.
+        white_before, white_after: tests of the residuals.
+        outliers: readings that were left out, (n,).
+    """
+
+    experiment: Experiment
+    verdict: Verdict
+    noise: float
+    noise_source: str
+    baseline: Fit
+    final: Fit
+    best: Fit | None
+    effects: tuple[Effect, ...]
+    rivals: dict[str, list[str]]
+    candidates: list[Candidate]
+    holdout_before: float
+    holdout_after: float
+    holdout_source: str
+    white_before: Whiteness
+    white_after: Whiteness
+    outliers: Flags
+    notes: list[str] = field(default_factory=list)
