@@ -131,7 +131,7 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
         console.print(part["headline"], soft_wrap=True)
         table = Table()
         for heading in ("", "parameter", "value", "±", "unit", "rivals"):
-            table.add_column(heading, no_wrap=heading != "rivals", overflow="fold")
+            table.add_column(heading, no_wrap=True, overflow="fold")
         model = part["model"]
         for effect in [{"name": "baseline", **part["baseline"], "rivals": []}, *part["effects"]]:
             # The baseline's as they are in the model that is reported.
@@ -142,7 +142,7 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
                     _shown(model["parameters"][name]),
                     _shown(model["std"][name]),
                     part["parameters"][name]["unit"],
-                    "" if k else ", ".join(effect["rivals"]),
+                    "" if k else "\n".join(effect["rivals"]),
                 )
         if table.row_count:
             console.print(table)

@@ -201,6 +201,7 @@ def test_a_baseline_without_enough_readings_is_exit_code_3(diagnosed, tmp_path, 
 
 def test_units_are_those_of_the_names():
     units = {"k1_N": "N", "c1_N_s": "N s", "drift_N_s": "N/s", "rounding_rad_s": "rad/s", "n": ""}
+    units |= {"b_N_mm3": "N mm³", "kappa0_1_mm": "1/mm", "compliance_rad_per_N": "rad/N"}
     units |= {"slip_angle_rad": "rad", "free_travel_mm": "mm", "force_N": "N", "angle_deg": "°"}
     assert {name: parameter_unit(name) for name in units} == units
 

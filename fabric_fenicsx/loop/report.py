@@ -30,10 +30,12 @@ SCHEMA = "fabric-report/1"
 PARAMETER_UNITS = {
     "N_s_n": "N sⁿ",
     "1_rad2": "1/rad²",
+    "rad_per_N": "rad/N",
+    "N_mm3": "N mm³",
+    "1_mm": "1/mm",
     "rad_s": "rad/s",
     "rad": "rad",
     "N_s": "N s",
-    "per_mm": "1/mm",
 }
 OTHER_UNITS = {"drift_N_s": "N/s"}
 """A drift's unit is written like a dashpot's."""
