@@ -130,10 +130,10 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
         console.print(f"{test}: {part['verdict']}", soft_wrap=True)
         console.print(part["headline"], soft_wrap=True)
         table = Table()
-        for heading in ("", "parameter", "value", "±", "unit", "rivals"):
+        for heading in ("", "parameter", "value", "±", "unit"):
             table.add_column(heading, no_wrap=True, overflow="fold")
         model = part["model"]
-        for effect in [{"name": "baseline", **part["baseline"], "rivals": []}, *part["effects"]]:
+        for effect in [{"name": "baseline", **part["baseline"]}, *part["effects"]]:
             # The baseline's as they are in the model that is reported.
             for k, name in enumerate(effect["parameters"]):
                 table.add_row(
@@ -142,7 +142,6 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
                     _shown(model["parameters"][name]),
                     _shown(model["std"][name]),
                     part["parameters"][name]["unit"],
-                    "" if k else "\n".join(effect["rivals"]),
                 )
         if table.row_count:
             console.print(table)
