@@ -24,6 +24,7 @@ from fabric_fenicsx.loop.shear_field import (
     hermite_weights,
     solved_field,
 )
+from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
 from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session, control
 from fabric_fenicsx.rigs.drape import build
@@ -336,6 +337,31 @@ def test_a_tool_without_friction_does_not_rub():
     names = {term.name for term in model.contacts.terms}
     assert names == {"punch", "die", "die friction", "holder", "holder friction"}
     assert not ContactLaw(0.5, 0.5).rubs("die")
+
+
+def test_a_made_up_drape_hides_what_a_diagnosis_finds(tmp_path):
+    case = DrapeCase(test="drape", sheet={"width_mm": 288, "length_mm": 288})
+    hidden = Hidden("punch_offset", "", {"dx_mm": 7.0, "dy_mm": -3.0})
+    made = synthesise(case, [hidden], 1.0, seed=4, readings=80, solve=made_up)
+    write_measurement(tmp_path / "made", made)
+    measurement = read_measurement(tmp_path / "made")
+    assert [run.count for run in measurement.runs] == [60, 20]
+    assert [run.holdout for run in measurement.runs] == [False, True]
+    diagnosis = diagnose_test(Drape([measurement], solve=made_up))
+    (effect,) = report_of(diagnosis, [measurement])["effects"]
+    assert effect["name"] == "punch_offset"
+    for name, value in hidden.values.items():
+        assert abs(effect["parameters"][name] - value) < 4.0 * effect["std"][name]
+    visible = synthesise(case, [Hidden("ply_rotation", "", {})], 1.0, readings=80, solve=made_up)
+    assert 3.0 < abs(visible.effects[0].values["rotation_deg"]) < 30.0
+
+
+def test_a_drape_that_no_measurement_can_tell_is_not_made_up():
+    oiled = DrapeCase(test="drape", contact={"friction": 0.1})
+    with pytest.raises(InputError, match=r"contact: .* put effects in as --effect"):
+        synthesise(oiled, [], 1.0, solve=made_up)
+    with pytest.raises(InputError, match="--rates: allowed with test: picture_frame only"):
+        synthesise(DrapeCase(test="drape"), [], 1.0, rates=[1.0], solve=made_up)
 
 
 @cache

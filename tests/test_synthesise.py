@@ -116,9 +116,11 @@ def test_what_is_there_is_kept(tmp_path, capsys):
     assert synthesise(tmp_path) == 2
     assert "allowed is a new or an empty folder" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["mine.csv"]
-    assert command("synthesise", DEMOS / "drape.yaml", "--noise", 1, "--out", tmp_path / "x") == 2
+    assert (
+        command("synthesise", DEMOS / "cantilever.yaml", "--noise", 1, "--out", tmp_path / "x") == 2
+    )
     line = capsys.readouterr().err
-    assert "drape.yaml: test: drape" in line and "allowed is picture_frame" in line
+    assert "cantilever.yaml: test: cantilever" in line and "allowed is picture_frame" in line
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import isclose, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +16,20 @@ import numpy.typing as npt
 import yaml
 
 from ..errors import InputError
-from ..rigs.cases import Case, PictureFrameCase
+from ..rigs.cases import Case, DrapeCase, PictureFrameCase, TowKeys
 from ..rigs.keys import one_of
 from ..rigs.picture_frame import crosshead, duration
 from ..rigs.validation import suggestion
+from .drape import Drape
 from .effects import Effect, Variant
 from .experiment import Experiment
-from .fitting import SMALL, orthogonal_to
+from .fitting import SMALL, orthogonal_to, weighted
 from .measurement import (
     COLUMNS,
     FILE,
     QUANTITY,
     SCHEMA,
+    DrapeRig,
     FabricKeys,
     MeasuredTowKeys,
     Measurement,
@@ -35,6 +37,7 @@ from .measurement import (
     Run,
 )
 from .registry import experiment_class
+from .shear_field import ShearLaw, Solve, drape_case, solved_field
 
 __all__ = ["Hidden", "Synthetic", "parse_effect", "synthesise", "write_measurement"]
 
@@ -108,44 +111,44 @@ def synthesise(
     readings: int = 200,
     own: Sequence[Effect] = (),
     place: str = "case",
+    solve: Solve = solved_field,
 ) -> Synthetic:
     """Measure a case in the model.
 
+    A drape is read in the filtered field of loop.drape: without the waves of two tow spacings that
+    a diagnosis leaves out as well, so that such a trial is kinder than a measured drape.
+
     Args:
-        case: of a picture frame; its shear law is the baseline.
+        case: of a picture frame or a drape; its shear law is the baseline.
         effects: to be put in.
-        noise: one sigma of a reading [N], Gaussian.
-        seed: of the noise.
+        noise: one sigma of a reading [N, degrees], Gaussian.
+        seed: of the noise, and of the places on a draped sheet.
         rates: of the crosshead [mm/min], a run for each, the last one held out; by default the
             case's, ten times and three times that.
-        readings: of each run, evenly in time.
+        readings: of each run, evenly in time; of a drape in all, the last quarter held out.
         own: effects of the user's.
         place: what errors call the case.
+        solve: from a case of a drape to its field.
 
     Raises:
         InputError: an effect, a form or a parameter is not known, or the case cannot be measured.
     """
-    if not isinstance(case, PictureFrameCase):
-        raise InputError(
-            f"{place}: test: {case.test} cannot be synthesised, allowed is picture_frame"
-        )
     if case.crossover.laws:
         raise InputError(
             f"{place}: crossover.laws: allowed is none of them here, put effects in as --effect"
         )
-    rates = rates or [factor * case.rate_mm_min for factor in (1.0, 10.0, 3.0)]
-    fabric = _fabric(case)
-    rig = PictureFrameRig(
-        frame_length_mm=case.frame_length_mm, fabric_length_mm=case.fabric_length_mm
-    )
-    fine = _frame_runs(case, rates, (readings - 1) * FINER + 1)
-    measurement = Measurement(Path(), case.test, case.title, fabric, rig, noise, fine)
-    experiment: Experiment = experiment_class(case.test)([measurement], own)
-    baseline = {
-        "k1_N": case.crossover.k1_N_mm,
-        "k3_N": case.crossover.k3_N_mm,
-        "c1_N_s": case.crossover.dashpot_N_s_mm,
-    }
+    if isinstance(case, PictureFrameCase):
+        measurement, baseline, finer, visible = _frame(case, noise, rates, readings)
+        experiment: Experiment = experiment_class(case.test)([measurement], own)
+    elif isinstance(case, DrapeCase):
+        if rates:
+            raise InputError("--rates: allowed with test: picture_frame only")
+        measurement, baseline, finer, visible = _drape(case, noise, readings, seed), {}, 1, 3.0
+        experiment = _draped(case, measurement, own, place, solve)
+    else:
+        raise InputError(
+            f"{place}: test: {case.test} cannot be synthesised, allowed is picture_frame or drape"
+        )
     forms: list[Variant] = []
     put_in: list[Hidden] = []
     values = dict(baseline)
@@ -154,27 +157,32 @@ def synthesise(
         form = _form(effect, hidden.label)
         if shared := set(values) & {p.name for p in form.parameters}:
             raise InputError(f"--effect: {effect.name}: {min(shared)} is another effect's as well")
-        own_values = _strengths(experiment, baseline, form, hidden.values, VISIBLE * noise)
+        own_values = _strengths(experiment, baseline, form, hidden.values, visible * noise)
         forms.append(form)
         values |= own_values
         put_in.append(Hidden(effect.name, form.label, own_values))
     expected, _ = experiment.predict(forms, values)
     rng = np.random.default_rng(seed)
     tables = {}
-    for number, run in enumerate(fine):
-        columns = {name: column[::FINER] for name, column in run.columns.items()}
-        own_rows = experiment.readings.run == number
-        exact = expected[own_rows][::FINER]
+    for number, run in enumerate(measurement.runs):
+        columns = {name: column[::finer] for name, column in run.columns.items()}
+        own_rows = np.flatnonzero(experiment.readings.run == number)
+        if experiment.readings.row is not None:
+            own_rows = own_rows[np.argsort(experiment.readings.row[own_rows])]
+        exact = expected[own_rows][::finer]
         columns[QUANTITY[case.test]] = exact + noise * rng.standard_normal(len(exact))
         tables[run.file] = columns
     content = {
         "schema": SCHEMA,
         "test": case.test,
         "title": case.title or case.test.replace("_", " "),
-        "fabric": fabric.model_dump(),
-        "rig": rig.model_dump(),
+        "fabric": measurement.fabric.model_dump(),
+        "rig": measurement.rig.model_dump(),
         "noise": {QUANTITY[case.test]: noise},
-        "runs": [{"file": r.file, "role": "holdout" if r.holdout else "fit"} for r in fine],
+        "runs": [
+            {"file": run.file, "role": "holdout" if run.holdout else "fit"}
+            for run in measurement.runs
+        ],
     }
     return Synthetic(content, tables, put_in)
 
@@ -190,7 +198,7 @@ def write_measurement(folder: Path, synthetic: Synthetic) -> None:
         raise InputError(f"{folder}: exists, allowed is a new or an empty folder")
     folder.mkdir(parents=True, exist_ok=True)
     for file, columns in synthetic.tables.items():
-        names = COLUMNS[synthetic.content["test"]]
+        names = [name for name in COLUMNS[synthetic.content["test"]] if name in columns]
         # Three decimals more than the noise.
         last = max(0, 3 - int(np.floor(np.log10(next(iter(synthetic.content["noise"].values()))))))
         texts = [[f"{v:.{DECIMALS.get(name, last)}f}" for v in columns[name]] for name in names]
@@ -200,15 +208,93 @@ def write_measurement(folder: Path, synthetic: Synthetic) -> None:
     (folder / FILE).write_text(text, encoding="utf-8")
 
 
-def _fabric(case: PictureFrameCase) -> FabricKeys:
-    tow = case.tow
-    per_area = 1.0 / case.warp_spacing_mm + 1.0 / case.weft_spacing_mm
+def _frame(
+    case: PictureFrameCase, noise: float, rates: Sequence[float], readings: int
+) -> tuple[Measurement, dict[str, float], int, float]:
+    """A frame's runs without forces, its baseline, how much finer they are, and VISIBLE."""
+    rates = rates or [factor * case.rate_mm_min for factor in (1.0, 10.0, 3.0)]
+    rig = PictureFrameRig(
+        frame_length_mm=case.frame_length_mm, fabric_length_mm=case.fabric_length_mm
+    )
+    fabric = _fabric(case.tow, case.warp_spacing_mm, case.weft_spacing_mm)
+    fine = _frame_runs(case, rates, (readings - 1) * FINER + 1)
+    baseline = {
+        "k1_N": case.crossover.k1_N_mm,
+        "k3_N": case.crossover.k3_N_mm,
+        "c1_N_s": case.crossover.dashpot_N_s_mm,
+    }
+    return (
+        Measurement(Path(), case.test, case.title, fabric, rig, noise, fine),
+        baseline,
+        FINER,
+        VISIBLE,
+    )
+
+
+def _drape(case: DrapeCase, noise: float, readings: int, seed: int) -> Measurement:
+    """A drape's places without angles, anywhere within the outer tows."""
+    sheet = case.sheet
+    rig = DrapeRig(
+        fabric_size_mm=sheet.width_mm,
+        **{name: getattr(case, name) for name in DrapeRig.model_fields if hasattr(case, name)},
+    )
+    fabric = _fabric(case.tow, sheet.warp_spacing_mm, sheet.weft_spacing_mm)
+    reach = (sheet.width_mm - sheet.warp_spacing_mm) / 2.0
+    x, y = np.round(np.random.default_rng([seed, 1]).uniform(-reach, reach, (2, readings)), 1)
+    first = 3 * readings // 4
+    runs = tuple(
+        Run(
+            file,
+            held,
+            "",
+            {"x_mm": x[own], "y_mm": y[own], "angle_deg": np.full(len(x[own]), 90.0)},
+        )
+        for file, held, own in (
+            ("run1.csv", False, slice(0, first)),
+            ("run2.csv", True, slice(first, None)),
+        )
+    )
+    return Measurement(Path(), case.test, case.title, fabric, rig, noise, runs)
+
+
+def _draped(
+    case: DrapeCase, measurement: Measurement, own: Sequence[Effect], place: str, solve: Solve
+) -> Experiment:
+    """The experiment of such a drape, with the case's laws."""
+    keys = case.crossover
+    shear = ShearLaw(keys.k1_N_mm, keys.k3_N_mm, keys.dashpot_N_s_mm)
+    experiment = Drape(
+        [measurement], own, shear=shear, C1=case.tow.C1_MPa, source=place, solve=solve
+    )
+    again = drape_case(measurement, shear, case.tow.C1_MPa).model_dump()
+    for name, value in case.model_dump().items():
+        if name not in ("title", "assumptions", "points", "symmetry") and not _alike(
+            again[name], value
+        ):
+            raise InputError(
+                f"{place}: {name}: a measured drape has no other than the default there, "
+                "put effects in as --effect"
+            )
+    return experiment
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Equal but for round-off."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_alike(one[key], other[key]) for key in one)
+    if isinstance(one, float) and isinstance(other, float):
+        return isclose(one, other, rel_tol=1e-5)
+    return bool(one == other)
+
+
+def _fabric(tow: TowKeys, warp_spacing: float, weft_spacing: float) -> FabricKeys:
+    per_area = 1.0 / warp_spacing + 1.0 / weft_spacing
     # kg/mm² to kg/m²
     density = 1e6 * tow.density_kg_mm3 * tow.width_mm * tow.height_mm * per_area
     keys = {name: getattr(tow, name) for name in MeasuredTowKeys.model_fields}
     return FabricKeys(
         areal_density_kg_m2=round(density, 6),
-        tow_spacing_mm=case.warp_spacing_mm,
+        tow_spacing_mm=warp_spacing,
         tow=MeasuredTowKeys(**keys),
     )
 
@@ -270,7 +356,7 @@ def _strengths(
     if not free:
         return values
     without, slopes = experiment.predict((), dict(baseline))
-    J = np.column_stack([slopes[name] for name in baseline])
+    J = weighted(slopes, baseline, np.ones(len(without), dtype=bool), np.ones(len(without)))
 
     def left(change: Array) -> float:
         return float(np.linalg.norm(orthogonal_to(J, change[:, None]))) / sqrt(len(change))
