@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from scipy.optimize import least_squares
+from test_demos import demo
 
 from fabric_fenicsx.errors import InputError, SolveError
 from fabric_fenicsx.loop.drape import OTHER_MESH, Drape, nearest_next
@@ -362,6 +363,18 @@ def test_a_drape_that_no_measurement_can_tell_is_not_made_up():
         synthesise(oiled, [], 1.0, solve=made_up)
     with pytest.raises(InputError, match="--rates: allowed with test: picture_frame only"):
         synthesise(DrapeCase(test="drape"), [], 1.0, rates=[1.0], solve=made_up)
+
+
+def test_table_4_is_written_as_a_page(tmp_path):
+    """The page that is kept has the same parts; its numbers are those of the finite elements."""
+    results = demo("table_4").main(tmp_path, solve=made_up)
+    assert results["report"]["test"] == "drape"
+    assert (tmp_path / "report.html").is_file()
+    kept = (Path(__file__).parents[1] / "docs" / "table4.md").read_text()
+    headings = [line for line in results["page"].splitlines() if line.startswith(("#", "| point"))]
+    assert headings == [line for line in kept.splitlines() if line.startswith(("#", "| point"))]
+    assert "| 3 | 6, 116 mm | 87.2 ± 0.9 |" in results["page"]
+    assert "| 3 | 6, 116 mm | 87.2 ± 0.9 |" in kept
 
 
 @cache
