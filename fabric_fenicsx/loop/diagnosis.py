@@ -52,7 +52,7 @@ class Diagnosis:
         effects: of ``final``, strongest first.
         rivals: by effect, others that this data cannot tell from it.
         candidates: every effect tried.
-        holdout_before, holdout_after: held-out errors.
+        holdout_before, holdout_after, holdout_best: held-out errors of the three models.
         holdout_source: how they were come by.
         white_before, white_after: tests of the residuals.
         outliers: readings that were left out, (n,).
@@ -70,6 +70,7 @@ class Diagnosis:
     candidates: list[Candidate]
     holdout_before: float
     holdout_after: float
+    holdout_best: float
     holdout_source: str
     white_before: Whiteness
     white_after: Whiteness

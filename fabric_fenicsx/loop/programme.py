@@ -94,10 +94,11 @@ def programme(time: Array, displacement: Array) -> Programme:
     ]
     points += [(t, d, v, -1) for t, d, v in added]
     first, speed = float(displacement[0]), float(rate[0])
-    if first * speed > 0.0 and abs(first) > resolution:
+    square = max(resolution, 1e-6 * float(np.ptp(displacement)))
+    if first * speed > 0.0 and abs(first) > square:
         # The frame starts from the square, also where the record does not.
         points.append((float(time[0]) - first / speed, 0.0, speed, -1))
-    elif abs(first) <= max(resolution, 1e-9):
+    elif abs(first) <= square:
         certain[0] = False
     points.sort(key=lambda point: point[0])
     columns = np.array(points)

@@ -86,7 +86,7 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
         "noise_source": d.noise_source,
         "holdout_source": d.holdout_source,
         "model": _model(d, d.final),
-        "best": _model(d, d.best) if d.best is not None else None,
+        "best": _nearest(d, d.best) if d.best is not None else None,
         "further_tests": _further_tests(d),
         "identifiability": {
             "correlated": [list(pair) for pair in d.final.correlated],
@@ -198,30 +198,21 @@ def _is_form(variant: Variant, effect: Effect) -> bool:
     return any(variant is form for form in effect.variants)
 
 
-def _model(d: Diagnosis, model: Fit) -> dict[str, Any]:
-    """All numbers of a fitted model and what it leaves."""
+def _nearest(d: Diagnosis, model: Fit) -> dict[str, Any]:
+    """All numbers of the model that came nearest, and what it leaves."""
     forms = [
         _form(d, model, effect, variant)
         for variant in model.variants
         for effect in d.experiment.effects
         if _is_form(variant, effect)
     ]
-    readings = d.experiment.readings
-    out = readings.holdout & readings.usable & ~d.outliers
     return {
         "effects": forms,
         "parameters": model.values,
         "std": model.errors_at(d.noise),
         "error_fit": model.rms(d.baseline.used),
-        # Without holdout runs only a search refits for it.
-        "error_holdout": model.rms(out) if out.any() else _candidate_holdout(d, model),
+        "error_holdout": d.holdout_best,
     }
-
-
-def _candidate_holdout(d: Diagnosis, model: Fit) -> float | None:
-    if model is d.final:
-        return d.holdout_after
-    return next((c.holdout for c in d.candidates if c.fit is model), None)
 
 
 def _parameters(d: Diagnosis) -> list[Parameter]:

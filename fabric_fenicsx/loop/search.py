@@ -155,6 +155,7 @@ class _Search:
             candidates=candidates,
             holdout_before=self._holdout(baseline),
             holdout_after=self._holdout(chosen),
+            holdout_best=self._holdout(nearest[0]),
             holdout_source=self._source(),
             white_before=self._whiteness(baseline),
             white_after=self._whiteness(chosen),
