@@ -85,8 +85,8 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
         },
         "noise_source": d.noise_source,
         "holdout_source": d.holdout_source,
-        "model": _model(d, d.final),
-        "best": _nearest(d, d.best) if d.best is not None else None,
+        "model": _numbers(d, d.final, d.holdout_after),
+        "best": None if d.best is None else _numbers(d, d.best, d.holdout_best),
         "further_tests": _further_tests(d),
         "identifiability": {
             "correlated": [list(pair) for pair in d.final.correlated],
@@ -198,8 +198,8 @@ def _is_form(variant: Variant, effect: Effect) -> bool:
     return any(variant is form for form in effect.variants)
 
 
-def _nearest(d: Diagnosis, model: Fit) -> dict[str, Any]:
-    """All numbers of the model that came nearest, and what it leaves."""
+def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
+    """All numbers of a fitted model and what it leaves."""
     forms = [
         _form(d, model, effect, variant)
         for variant in model.variants
@@ -211,7 +211,7 @@ def _nearest(d: Diagnosis, model: Fit) -> dict[str, Any]:
         "parameters": model.values,
         "std": model.errors_at(d.noise),
         "error_fit": model.rms(d.baseline.used),
-        "error_holdout": d.holdout_best,
+        "error_holdout": holdout,
     }
 
 
