@@ -384,7 +384,7 @@ def _solved(text):
 
 def solved(case):
     """The finite elements, once for each case."""
-    return _solved(case.model_dump_json())
+    return _solved(case.model_dump_json(exclude_unset=True))
 
 
 def changed(measurement, **changes):
