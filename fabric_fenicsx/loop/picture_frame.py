@@ -103,6 +103,8 @@ class PictureFrame:
             return
         k = np.linalg.lstsq(J[rows], self.readings.observed[rows], rcond=None)[0]
         factor = self._at_readings(self._kinematics(self._travel(None, {}), {})["factor"].value)
+        # Where nothing is known of the rate the programme has left the reading out itself.
+        doubt = np.where(np.isfinite(doubt), doubt, 0.0)
         clear = np.abs(k[-1] * factor * doubt) < self.noise
         if (rows & clear).sum() > rows.sum() / 2:
             self.readings = replace(self.readings, usable=self.readings.usable & clear)
