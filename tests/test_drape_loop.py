@@ -430,7 +430,7 @@ def test_friction_in_the_whole_model_is_found(tmp_path, name, changes, parameter
 
 @pytest.mark.slow
 def test_an_offset_in_the_whole_model_is_a_shift_if_friction_holds_the_sheet(tmp_path):
-    """Without friction the sheet slides, see loop/drape_effects.py."""
+    """Without friction it is not one, see loop/drape_effects.py."""
     case = DrapeCase(
         test="drape",
         sheet={"width_mm": 288, "length_mm": 288},

@@ -4,8 +4,8 @@ Those of place cost no further solution: the tools are bodies of revolution, so 
 was moved or turned under them has the aligned sheet's angles in other places. That is exact for a
 turn. For an offset the sheet must be large and something must hold it: of a run of the whole demo
 with the punch at (6, −4) mm and friction 0.1 the best shift is (5.7, −4.2) mm, 1.0° rms away;
-without any friction the sheet slides as it is drawn, and the best shift is (11.8, −5.4) mm, 2.4°
-rms away. So an offset found on oiled tools may be up to twice the one there is.
+without any friction the best shift is (11.8, −5.4) mm, 2.4° rms away: probably the sheet, held by
+nothing, slides as it is drawn. An offset found on oiled tools may be up to twice the one there is.
 """
 
 from __future__ import annotations
