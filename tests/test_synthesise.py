@@ -116,11 +116,19 @@ def test_what_is_there_is_kept(tmp_path, capsys):
     assert synthesise(tmp_path) == 2
     assert "allowed is a new or an empty folder" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["mine.csv"]
-    assert (
-        command("synthesise", DEMOS / "cantilever.yaml", "--noise", 1, "--out", tmp_path / "x") == 2
-    )
-    line = capsys.readouterr().err
-    assert "cantilever.yaml: test: cantilever" in line and "allowed is picture_frame" in line
+
+
+def test_a_hidden_turn_of_a_clamp_is_found(tmp_path):
+    made, out = tmp_path / "made", tmp_path / "report"
+    hidden = "clamp_tilt:tilt_rad=0.03"
+    arguments = ("--effect", hidden, "--noise", 0.1, "--readings", 20, "--out", made)
+    assert command("synthesise", DEMOS / "cantilever.yaml", *arguments, "--quiet") == 0
+    table = np.genfromtxt(made / "run3.csv", delimiter=",", names=True)
+    assert table["s_mm"][-1] == table["length_mm"][-1] > table["x_mm"][-1]
+    assert command("diagnose", made, "--out", out, "--quiet") == 0
+    (effect,) = json.loads((out / "report.json").read_text())["effects"]
+    assert effect["name"] == "clamp_tilt"
+    assert abs(effect["parameters"]["tilt_rad"] - 0.03) < 3.0 * effect["std"]["tilt_rad"]
 
 
 @pytest.mark.parametrize(

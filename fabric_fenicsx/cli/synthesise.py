@@ -20,7 +20,7 @@ __all__ = ["synthesise"]
 def synthesise(
     case: Annotated[Path, typer.Argument(metavar="CASE.yaml", help="The case of the test.")],
     noise: Annotated[
-        float, typer.Option("--noise", metavar="X", help="One sigma of a reading [N, °].")
+        float, typer.Option("--noise", metavar="X", help="One sigma of a reading [N, mm, °].")
     ],
     effect: Annotated[
         list[str] | None,
@@ -67,8 +67,7 @@ def synthesise(
 
         loaded = from_root(comm, lambda: load_case(case))
         # On every rank: PETSc starts up in all processes at once.
-        if loaded.test in ("picture_frame", "drape"):
-            experiment_class(loaded.test)
+        experiment_class(loaded.test)
         put_in = from_root(
             comm,
             lambda: _write(

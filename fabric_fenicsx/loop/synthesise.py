@@ -16,7 +16,7 @@ import numpy.typing as npt
 import yaml
 
 from ..errors import InputError
-from ..rigs.cases import Case, DrapeCase, PictureFrameCase, TowKeys
+from ..rigs.cases import CantileverCase, Case, DrapeCase, PictureFrameCase, TowKeys
 from ..rigs.keys import one_of
 from ..rigs.picture_frame import crosshead, duration
 from ..rigs.validation import suggestion
@@ -29,6 +29,7 @@ from .measurement import (
     FILE,
     QUANTITY,
     SCHEMA,
+    CantileverRig,
     DrapeRig,
     FabricKeys,
     MeasuredTowKeys,
@@ -119,13 +120,14 @@ def synthesise(
     a diagnosis leaves out as well, so that such a trial is kinder than a measured drape.
 
     Args:
-        case: of a picture frame or a drape; its shear law is the baseline.
+        case: of the test; its shear law, or its C1, is the baseline.
         effects: to be put in.
-        noise: one sigma of a reading [N, degrees], Gaussian.
+        noise: one sigma of a reading [N, mm, degrees], Gaussian.
         seed: of the noise, and of the places on a draped sheet.
         rates: of the crosshead [mm/min], a run for each, the last one held out; by default the
             case's, ten times and three times that.
-        readings: of each run, evenly in time; of a drape in all, the last quarter held out.
+        readings: of each run, evenly in time, or along each specimen of a cantilever; of a drape
+            in all, the last quarter held out.
         own: effects of the user's.
         place: what errors call the case.
         solve: from a case of a drape to its field.
@@ -146,9 +148,11 @@ def synthesise(
         measurement, baseline, finer, visible = _drape(case, noise, readings, seed), {}, 1, 3.0
         experiment = _draped(case, measurement, own, place, solve)
     else:
-        raise InputError(
-            f"{place}: test: {case.test} cannot be synthesised, allowed is picture_frame or drape"
-        )
+        if rates:
+            raise InputError("--rates: allowed with test: picture_frame only")
+        measurement, finer, visible = _strips(case, noise, readings), FINER, VISIBLE
+        baseline = {"C1_MPa": case.tow.C1_MPa}
+        experiment = experiment_class(case.test)([measurement], own)
     forms: list[Variant] = []
     put_in: list[Hidden] = []
     values = dict(baseline)
@@ -169,6 +173,8 @@ def synthesise(
         own_rows = np.flatnonzero(experiment.readings.run == number)
         if experiment.readings.row is not None:
             own_rows = own_rows[np.argsort(experiment.readings.row[own_rows])]
+        if case.test == "cantilever":
+            columns["x_mm"] = _along(run.columns["s_mm"], expected[own_rows])[::finer]
         exact = expected[own_rows][::finer]
         columns[QUANTITY[case.test]] = exact + noise * rng.standard_normal(len(exact))
         tables[run.file] = columns
@@ -229,6 +235,28 @@ def _frame(
         FINER,
         VISIBLE,
     )
+
+
+def _strips(case: CantileverCase, noise: float, readings: int) -> Measurement:
+    """Specimens without heights, one in each run; of three or more the middle one is held out."""
+    lengths = sorted(set(case.lengths_mm))
+    held = lengths[len(lengths) // 2] if len(lengths) > 2 else None
+    runs = []
+    for number, length in enumerate(lengths, start=1):
+        s = np.linspace(length / readings, length, (readings - 1) * FINER + 1)
+        # Any line that hangs will do: it is only where the readings are.
+        line = {"length_mm": np.full(len(s), length), "s_mm": s, "x_mm": s, "z_mm": -0.05 * s}
+        runs.append(Run(f"run{number}.csv", length == held, "", line))
+    fabric = _fabric(case.tow, case.warp_spacing_mm, case.weft_spacing_mm)
+    rig = CantileverRig(width_mm=case.width_mm, gravity_mm_s2=case.gravity_mm_s2)
+    return Measurement(Path(), case.test, case.title, fabric, rig, noise, tuple(runs))
+
+
+def _along(s: Array, z: Array) -> Array:
+    """Horizontal place of points of an inextensible line, from their arc lengths and heights."""
+    step = np.diff(s, prepend=0.0)
+    rise = np.diff(z, prepend=0.0)
+    return np.cumsum(np.sqrt(np.maximum(step**2 - rise**2, 0.0)))
 
 
 def _drape(case: DrapeCase, noise: float, readings: int, seed: int) -> Measurement:
