@@ -23,7 +23,7 @@ from ufl import acos, sin
 
 from ..mechanics.scalars import derivative_of
 from ..mechanics.shear_laws import Crossing, LinearDashpot, PolynomialSpring
-from .effects import Effect, FrameVariant, Parameter, Variant
+from .effects import Effect, FrameVariant, Parameter, Variant, scaled
 from .experiment import Readings
 from .marching import Marched, Varying
 from .measurement import Measurement
@@ -89,7 +89,7 @@ class PictureFrame:
             "rate": float(np.abs(rate).max()),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
-        self.effects = [self._with_runs(_scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
+        self.effects = [self._with_runs(scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
 
     def _leave_out_uncertain(self, doubt: Array) -> None:
         """Leave out readings whose rate is so uncertain [rad/s] that the dashpot's force is.
@@ -315,19 +315,3 @@ def _common_noise(measurements: Sequence[Measurement]) -> float | None:
     if len(given) < len(measurements):
         return None
     return float(np.sqrt(np.mean(np.square(given))))
-
-
-def _scaled(effect: Effect, shares: Mapping[str, float]) -> Effect:
-    """Starts and bounds that are shares of the data's ranges, in their own unit."""
-
-    def parameter(p: Parameter) -> Parameter:
-        if not p.share_of:
-            return p
-        full = shares[p.share_of]
-        starts = tuple(full * s for s in p.starts)
-        return replace(p, starts=starts, lower=full * p.lower, upper=full * p.upper, share_of="")
-
-    variants = tuple(
-        replace(v, parameters=tuple(parameter(p) for p in v.parameters)) for v in effect.variants
-    )
-    return replace(effect, variants=variants)

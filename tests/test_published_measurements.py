@@ -1,0 +1,46 @@
+"""Published measurements, where they are at hand: FABRIC_MEASUREMENTS names the folder of them.
+
+They are not kept here. Each is a folder with a measurement.yaml, see docs/tutorial_measurements.md.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from fabric_fenicsx.__main__ import main
+
+FOLDER = Path(os.environ.get("FABRIC_MEASUREMENTS", "/nowhere"))
+
+pytestmark = pytest.mark.slow
+
+
+def report_of(name, tmp_path):
+    folder = FOLDER / name
+    if not (folder / "measurement.yaml").is_file():
+        pytest.skip(f"FABRIC_MEASUREMENTS has no {name}")
+    with pytest.raises(SystemExit) as ended:
+        main(["diagnose", str(folder), "--out", str(tmp_path / "out"), "--quiet"])
+    assert not ended.value.code
+    return json.loads((tmp_path / "out" / "report.json").read_text())
+
+
+def test_a_strip_that_softens_in_bending(tmp_path):
+    """Broberg et al. (2023): a constant stiffness leaves 5.95 mm rms, a softening law 0.41 mm."""
+    report = report_of("aalborg-strip-a", tmp_path)
+    assert report["error"]["before"]["fit"] == pytest.approx(5.95, rel=0.05)
+    candidates = {c["name"]: c["error_fit"] for c in report["candidates"]}
+    assert candidates["nonlinear_bending"] < 0.6
+    assert candidates["nonlinear_bending"] < 0.5 * candidates["clamp_tilt"]
+
+
+@pytest.mark.parametrize("laboratory", ["kul1", "uml", "ut"])
+def test_one_shear_of_a_frame_has_rivals(laboratory, tmp_path):
+    """Cao et al. (2008): a plateau at small angles, locking; monotone, so that effects compete."""
+    report = report_of(f"cao2008-plain-{laboratory}", tmp_path)
+    assert report["verdict"] == "effect_found"
+    assert report["error"]["after"]["fit"] < 0.6 * report["error"]["before"]["fit"]
+    assert any(effect["rivals"] for effect in report["effects"])
