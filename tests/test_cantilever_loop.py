@@ -206,6 +206,25 @@ def test_start_is_near_for_any_stiffness(C1):
     assert found.values["C1_MPa"] == pytest.approx(C1, rel=1e-3)
 
 
+@pytest.mark.parametrize(("heavy", "kappa0"), [(60.0, -0.01), (8000.0, 0.0), (10.0, 0.01)])
+def test_a_strip_far_from_the_last_one(exact, heavy, kappa0):
+    # Curled up by 1.5 rad, all but vertical: no Newton step from a flat strip gets there.
+    variants = form(exact, ("residual_curvature", "constant"))
+    flat = exact.predict(variants, {"C1_MPa": 1e4 * B / PER_C1, "kappa0_1_mm": 0.0})[0]
+    stiffness = WEIGHT * LENGTH**3 / heavy
+    values = {"C1_MPa": stiffness / PER_C1, "kappa0_1_mm": kappa0}
+    expected, _ = exact.predict(variants, values)
+    assert np.abs(flat).max() < 0.1
+    if heavy > 1e3:
+        # It folds within a few lengths (B/w L)^(1/2) of the clamp.
+        bend = np.sqrt(stiffness / (WEIGHT * 150.0))
+        assert -150.0 < expected[-1] < -150.0 + 3.0 * bend
+    else:
+        s, _, z, _ = hang(Strip(150.0, stiffness, WEIGHT, curvature=kappa0))
+        at = exact.readings.covariates["arc length [mm]"][exact.readings.run == 1]
+        assert expected[exact.readings.run == 1] == pytest.approx(CubicSpline(s, z)(at), abs=0.02)
+
+
 def test_no_balance_is_told():
     tow = HangingTow(LENGTH, WIDTH, HEIGHT, SPACING, WEIGHT)
     with pytest.raises(SolveError, match="a strip of 250 mm finds no balance"):

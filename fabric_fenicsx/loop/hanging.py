@@ -45,8 +45,8 @@ GRADING = 0.5
 LIMIT = 15
 #: Newton's on the turn of the root.
 TURNS = 25
-#: Smallest step of the weight where it is put on gradually.
-LEAST_STEP = 1e-3
+#: Steps in which the weight is put on where it is put on gradually, failed ones included.
+STEPS = 40
 #: Round-off of the forces in a tow whose stiffness is EA over its positions, in units of theirs.
 ROUNDING = 20.0
 
@@ -140,7 +140,6 @@ class HangingTow:
         self._laws, self._values = NONE, {"B": 1.0}
         self._phi, self._root = 0.0, 0.0
         self._state = (fields.u_n.x.array, fields.q_n.x.array)
-        self._flat = [values.copy() for values in self._state]
 
     def solve(
         self, values: Mapping[str, float], laws: Laws = NONE, *, slopes: bool = True
@@ -218,9 +217,7 @@ class HangingTow:
         It is -B κ0 + Σ m(κ - κ0): added to B κ, the law is that of what exceeds κ0.
         """
         total = Varying(kappa, {"kappa": np.ones_like(kappa)})
-        at_rest = _sum(
-            law({"kappa": total}, self._values)["unloaded"] for law in self._laws.unloaded
-        )
+        at_rest = self._at_rest(kappa)
         back = {name: -slope for name, slope in at_rest.slopes.items()}
         beyond = {"kappa": Varying(kappa - at_rest.value, {**total.slopes, **back})}
         B = self._values["B"]
@@ -228,6 +225,11 @@ class HangingTow:
         shift["B"] = shift.get("B", 0.0) - at_rest.value
         own = (law(beyond, self._values)["moment"] for law in self._laws.moments)
         return _sum((Varying(-B * at_rest.value, shift), *own))
+
+    def _at_rest(self, kappa: Array) -> Varying:
+        """Curvature of the unloaded strip, with derivatives in the parameters."""
+        given = {"kappa": Varying(kappa)}
+        return _sum(law(given, self._values)["unloaded"] for law in self._laws.unloaded)
 
     def _turn(self, root: float) -> Varying:
         given = {"root": Varying(np.array(root), {"root": np.array(1.0)})}
@@ -245,20 +247,35 @@ class HangingTow:
         before = [values.copy() for values in self._state]
         if self._step(1.0):
             return
-        self._restore(self._flat)
-        done, step = 0.0, 0.2
-        while done < 1.0:
+        self._restore(self._unloaded())
+        # What bends the linear strip by half a radian or so.
+        first = min(0.2, 4.0 * self._values["C1_MPa"] / self.load_per_C1)
+        done, step = 0.0, first
+        for _ in range(STEPS):
             target = min(done + step, 1.0)
             if self._step(target):
-                done, step = target, 1.5 * step
-                continue
-            step /= 3.0
-            if step < LEAST_STEP:
-                self._restore(before)
-                raise SolveError(
-                    f"a strip of {self.length:g} mm finds no balance under {target:.3g} of its "
-                    "weight"
-                )
+                done, step = target, 2.0 * step
+                if done == 1.0:
+                    return
+            else:
+                step /= 3.0
+        self._restore(before)
+        raise SolveError(
+            f"a strip of {self.length:g} mm finds no balance under more than {done:.3g} of its weight"
+        )
+
+    def _unloaded(self) -> list[Array]:
+        """Displacements and rotations without weight: an arc of the unloaded curvature."""
+        kappa = float(np.mean(self._at_rest(np.zeros(1)).value))
+        turn = kappa * self.arc
+        # sin(a)/a and (1 - cos a)/a, also where a is zero.
+        x = self.arc * np.sinc(turn / np.pi)
+        z = self.arc * np.sin(turn / 2.0) * np.sinc(turn / 2.0 / np.pi)
+        zero = np.zeros_like(x)
+        u = np.stack([x - self.arc, zero, z], axis=1)
+        q = np.stack([np.cos(turn / 2.0), zero, -np.sin(turn / 2.0), zero], axis=1)
+        blocks = self.model.disc.local_nodes
+        return [u[blocks].ravel(), q[blocks].ravel()]
 
     def _step(self, load: float) -> bool:
         model, newton = self.model, self._newton
