@@ -241,7 +241,6 @@ def test_a_drape_takes_the_shear_law_of_the_frames(diagnosed, tmp_path, monkeypa
     assert text.count("<section>") == 2 and (tmp_path / "out/drape_data.png").exists()
 
 
-@pytest.mark.mpi
 def test_two_ranks_report_the_same(diagnosed, tmp_path):
     folder, out = diagnosed["crossover_friction-dahl"]
     env = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
