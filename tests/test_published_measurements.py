@@ -29,9 +29,12 @@ def report_of(name, tmp_path):
 
 
 def test_a_strip_that_softens_in_bending(tmp_path):
-    """Broberg et al. (2023): a constant stiffness leaves 5.95 mm rms, a softening law 0.41 mm."""
+    """A photograph of Broberg et al. (2023): softening explains it, a turned clamp does not.
+
+    In heights at given arc lengths, a constant stiffness leaves 5.0 mm rms.
+    """
     report = report_of("aalborg-strip-a", tmp_path)
-    assert report["error"]["before"]["fit"] == pytest.approx(5.95, rel=0.05)
+    assert report["error"]["before"]["fit"] == pytest.approx(5.0, rel=0.03)
     candidates = {c["name"]: c["error_fit"] for c in report["candidates"]}
     assert candidates["nonlinear_bending"] < 0.6
     assert candidates["nonlinear_bending"] < 0.5 * candidates["clamp_tilt"]
