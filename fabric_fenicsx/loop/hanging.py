@@ -261,7 +261,8 @@ class HangingTow:
                 step /= 3.0
         self._restore(before)
         raise SolveError(
-            f"a strip of {self.length:g} mm finds no balance under more than {done:.3g} of its weight"
+            f"a strip of {self.length:g} mm finds no balance under more than {done:.3g} of its "
+            "weight"
         )
 
     def _unloaded(self) -> list[Array]:
