@@ -179,7 +179,7 @@ def test_step_files_of_other_versions(tmp_path, capsys):
 
     def run(*arguments):
         with pytest.raises(SystemExit) as ended:
-            main(["run", str(path), "--out", str(results), "--no-pictures", *arguments])
+            main(["run", str(path), "--out", str(results), "--no-pictures", "--quiet", *arguments])
         return ended.value.code, capsys.readouterr().err
 
     assert run()[0] == 0
