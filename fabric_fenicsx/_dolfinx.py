@@ -155,6 +155,31 @@ def constant(mesh: Any, value: float | tuple[float, ...]) -> Any:
     )
 
 
+def _merged(form: Any) -> Any:
+    """A form with one integral for each measure, or None.
+
+    UFL would do that itself, but only after expanding each integral for itself: it then has to
+    compare what they share node by node, which took most of the time of a compilation.
+    """
+    if form is None:
+        return None
+    groups: dict[str, list[Any]] = {}
+    for integral in form.integrals():
+        measure = (
+            integral.integral_type(),
+            integral.ufl_domain(),
+            integral.subdomain_id(),
+            sorted(integral.metadata().items()),
+        )
+        groups.setdefault(repr(measure), []).append(integral)
+    return ufl.Form(
+        [
+            group[0].reconstruct(sum((one.integrand() for one in group[1:]), group[0].integrand()))
+            for group in groups.values()
+        ]
+    )
+
+
 def compile_form(form: ufl.Form, comm: MPI.Comm, *, here: bool = True) -> Any:
     """Compile a form; rank 0 first, the others read its result from the cache.
 
@@ -169,7 +194,7 @@ def compile_form(form: ufl.Form, comm: MPI.Comm, *, here: bool = True) -> Any:
     options = "jit_options" if "jit_options" in _FORM_OPTIONS else "jit_params"
 
     def compiled() -> Any:
-        return fem.form(form, **{options: dict(_JIT_OPTIONS)})
+        return fem.form(_merged(form), **{options: dict(_JIT_OPTIONS)})
 
     result = None
     own_mesh = here and form.ufl_domain().ufl_cargo().comm.size == 1

@@ -16,16 +16,18 @@ network = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(network)
 
 
-def check_cost(result, iterations):
-    """No more than a third above the iterations it took, and nothing assembled beside them.
+def check_cost(result, iterations, factorisations):
+    """No more than a third above what it took, and nothing assembled beside that.
 
-    A factorisation and a tangent each (one tangent more for the matrix's pattern), and a residual
-    for each and for each step's guess; reactions take one more a step.
+    A tangent for each factorisation, of which some serve two iterations (one tangent more for the
+    matrix's pattern), and a residual for each iteration and for each step's guess; reactions take
+    one more a step.
     """
     assert result["steps"] == 20
     assert result["newton_iterations"] <= 1.33 * iterations
-    assert result["factorisations"] == result["newton_iterations"]
-    assert result["tangents"] == result["newton_iterations"] + 1
+    assert result["factorisations"] <= 1.33 * factorisations
+    assert result["factorisations"] < result["newton_iterations"]
+    assert result["tangents"] == result["factorisations"] + 1
     assert result["residuals"] <= result["newton_iterations"] + 2 * result["steps"]
 
 
@@ -33,20 +35,20 @@ def test_frame():
     """Exudyn, shear flexible like ours, gives 3880.67 (-1.813e-3 of n² k g); took 26 iterations."""
     result = network.frame(9, 4)
     assert result["force"] == pytest.approx(3880.67, abs=0.01)
-    check_cost(result, 26)
+    check_cost(result, 26, 24)
 
 
 @pytest.mark.parametrize(
-    ("n", "corner", "middle", "iterations"),
+    ("n", "corner", "middle", "iterations", "factorisations"),
     # z of OpenSees, Kratos and Exudyn at n = 9 lie between -63.7632 and -63.7483 (corner); OpenSees
     # alone finishes n = 17, with -189.4731 and -189.4677. They took 123, 176 and 382; 279.
-    [(9, -63.756, -63.718, 45), (17, -189.47, -189.46, 62)],
+    [(9, -63.756, -63.718, 51, 36), (17, -189.47, -189.46, 62, 53)],
 )
-def test_sheet(n, corner, middle, iterations):
+def test_sheet(n, corner, middle, iterations, factorisations):
     result = network.sheet(n, 4)
     assert result["z_corner"] == pytest.approx(corner, abs=0.02)
     assert result["z_middle"] == pytest.approx(middle, abs=0.02)
-    check_cost(result, iterations)
+    check_cost(result, iterations, factorisations)
 
 
 def test_sheet_converges_with_the_cells():

@@ -7,26 +7,34 @@ about its own axis.
     F = k Δ                       translational springs, the same k in x, y and z
     R = M δγ                      springs, dashpots and friction in the plane
     ψ = k_a (1 − n_warp · n_weft) alignment of the normals
+
+Variations are written out, see mechanics.variations. With m = n_warp + n_weft the angle is
+
+    γ = atan2(Y, X),    X = m·(t_weft × t_warp),    Y = |m| t_weft·t_warp
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from ufl import TestFunction, cross, derivative, dot, sqrt
+import ufl
+from ufl import TestFunction, diff, sqrt
 
 from .._dolfinx import atan2
-from .fields import ConnectorFields
+from .fields import ConnectorFields, rotation_part
 from .rotations import rotate
+from .terms import Term
+from .variations import Varied, add, cross, dot, product, root, times, turned
 
 __all__ = [
-    "alignment_energy",
+    "alignment_term",
     "crossing_values",
     "opening_energy",
     "rotational_energy",
     "shear_angle",
-    "turning_loss",
-    "turning_work",
+    "shear_angle_change",
+    "turning_term",
 ]
 
 
@@ -38,25 +46,100 @@ def shear_angle(fields: ConnectorFields, w: Any) -> Any:
     """
     q_warp, q_weft = fields.rotations(w)
     t_warp, t_weft = rotate(q_warp, fields.warp), rotate(q_weft, fields.weft)
-    n = rotate(q_warp, fields.normal) + rotate(q_weft, fields.normal)
-    n = n / sqrt(dot(n, n))
-    return atan2(dot(t_weft, t_warp), dot(n, cross(t_weft, t_warp))) - fields.angle_0
+    m = rotate(q_warp, fields.normal) + rotate(q_weft, fields.normal)
+    Y, X = sqrt(ufl.dot(m, m)) * ufl.dot(t_weft, t_warp), ufl.dot(m, ufl.cross(t_weft, t_warp))
+    return atan2(Y, X) - fields.angle_0
+
+
+def shear_angle_change(fields: ConnectorFields) -> Varied:
+    """The shear angle at the increment w with its derivatives in the nodes' turns."""
+    (t_warp, n_warp), (t_weft, n_weft) = _turned(
+        fields, (fields.warp, fields.normal), (fields.weft, fields.normal)
+    )
+    m = add(n_warp, n_weft)
+    Y = product(times, root(product(dot, m, m)), product(dot, t_weft, t_warp))
+    X = product(dot, m, product(cross, t_weft, t_warp))
+    x, y = X.value, Y.value
+    D = x**2 + y**2
+    first = [(x * y_i - y * x_i) / D for x_i, y_i in zip(X.first, Y.first, strict=True)]
+    # (X Y_j − Y X_j)/D once more; D_i/2 is X X_i + Y Y_i.
+    growth = [(x * x_i + y * y_i) / D for x_i, y_i in zip(X.first, Y.first, strict=True)]
+    second = {
+        (i, j): (x * Y.second[i, j] - y * X.second[i, j]) / D
+        - first[i] * growth[j]
+        - first[j] * growth[i]
+        for i, j in X.second
+    }
+    return Varied(shear_angle(fields, fields.w), first, second)
+
+
+def _turned(
+    fields: ConnectorFields, of_warp: tuple[Any, ...], of_weft: tuple[Any, ...]
+) -> tuple[list[Varied], list[Varied]]:
+    """Vectors that turn with the warp node, and those that turn with the weft node."""
+    thetas = [rotation_part(w) for w in fields.ends(fields.w)]
+    warp, weft = (
+        turned(q, theta, offset, directors)
+        for q, theta, offset, directors in zip(
+            fields.rotations(fields.w), thetas, (0, 3), (of_warp, of_weft), strict=True
+        )
+    )
+    return warp, weft
+
+
+def _forms(
+    fields: ConnectorFields, first: Sequence[Any], second: dict[tuple[int, int], Any], factor: Any
+) -> tuple[Any, Any]:
+    """Residual and tangent, factor times a gradient and second derivatives in the nodes' turns."""
+    v, dw = (
+        [rotation_part(end)[i] for end in fields.ends(f) for i in range(3)]
+        for f in (fields.test, fields.trial)
+    )
+    work = sum(f_i * v_i for f_i, v_i in zip(first, v, strict=True))
+    stiffness = sum(
+        f_ij * (v[i] * dw[j] + v[j] * dw[i] if i != j else v[i] * dw[i])
+        for (i, j), f_ij in second.items()
+    )
+    return factor * work * fields.point, factor * stiffness * fields.point
 
 
 def opening_energy(fields: ConnectorFields, k: Any) -> Any:
     """Energy of the three translational springs of stiffness k [N/mm]."""
     gap = fields.gap(fields.w)
-    return k * dot(gap, gap) / 2 * fields.point
+    return k * ufl.dot(gap, gap) / 2 * fields.point
 
 
-def turning_work(fields: ConnectorFields, moment: Any, gamma: Any) -> Any:
-    """Virtual work M δγ of an in-plane moment M(γ) at the crossings, weighted by interlacing."""
-    return fields.interlacing * moment * derivative(gamma, fields.w, fields.test) * fields.point
+def turning_term(
+    name: str,
+    fields: ConnectorFields,
+    moment: Any,
+    angle: Any,
+    change: Varied,
+    *,
+    energy: Any = None,
+    loss: Any = None,
+) -> Term:
+    """An in-plane moment M(γ) at the crossings: work M δγ, weighted by interlacing.
 
-
-def turning_loss(fields: ConnectorFields, moment: Any, change: Any) -> Any:
-    """Energy M Δγ that a moment takes over a step [N mm], with the moment at its end."""
-    return fields.interlacing * moment * change * fields.point
+    Args:
+        name: how reports call it.
+        fields: of the connectors.
+        moment: M [N mm], an expression in the angle.
+        angle: γ as a ``ufl.variable``.
+        change: its derivatives.
+        energy: stored energy, a form.
+        loss: Δγ over the step [rad] where M Δγ is lost; otherwise None.
+    """
+    slope = diff(moment, angle)
+    first = [moment * change_i for change_i in change.first]
+    second = {
+        (i, j): slope * change.first[i] * change.first[j] + moment * change_ij
+        for (i, j), change_ij in change.second.items()
+    }
+    share = fields.interlacing
+    residual, tangent = _forms(fields, first, second, share)
+    lost = None if loss is None else share * moment * loss * fields.point
+    return Term(name, "crossovers", residual, tangent, energy, lost, symmetric=True)
 
 
 def rotational_energy(fields: ConnectorFields, k1: Any, k3: Any) -> Any:
@@ -65,12 +148,13 @@ def rotational_energy(fields: ConnectorFields, k1: Any, k3: Any) -> Any:
     return fields.interlacing * (k1 * gamma**2 / 2 + k3 * gamma**4 / 4) * fields.point
 
 
-def alignment_energy(fields: ConnectorFields, k: Any) -> Any:
+def alignment_term(fields: ConnectorFields, k: Any) -> Term:
     """Energy k (1 − n_warp · n_weft): a restoring moment k sin(tilt) [N mm] between the normals."""
-    q_warp, q_weft = fields.rotations(fields.w)
-    return (
-        k * (1 - dot(rotate(q_warp, fields.normal), rotate(q_weft, fields.normal))) * fields.point
-    )
+    (warp,), (weft,) = _turned(fields, (fields.normal,), (fields.normal,))
+    cosine = product(dot, warp, weft)
+    residual, tangent = _forms(fields, cosine.first, cosine.second, -k)
+    energy = k * (1 - cosine.value) * fields.point
+    return Term("normal alignment", "crossovers", residual, tangent, energy, symmetric=True)
 
 
 def crossing_values(fields: ConnectorFields, f: Any, space: Any) -> Any:

@@ -8,7 +8,12 @@ and n the sheet's normal on the warp,
 
 A step is a return mapping: the trial force k (Δ − R s_n), cut in the plane at the limit. The force
 acts in the place that holds the weft, so that the warp node feels Δ × f besides; forces and moments
-balance and nothing depends on the frame. Without slip this is the spring k Δ. The crossing stays a
+balance and nothing depends on the frame. All that is the work of F(G) = Rᵀf on the gap G = RᵀΔ in
+the warp node's frame, with
+
+    δG = Rᵀ δΔ − W×G
+
+and W the node's material spin. Without slip this is the spring k Δ. The crossing stays a
 pair of nodes: slip should remain below their distance along the tow.
 """
 
@@ -17,10 +22,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ufl import conditional, cross, dot, gt, sqrt
+from ufl import conditional, cross, diff, dot, gt, sqrt, variable
 
 from .fields import ConnectorFields, rotation_part, translation_part
-from .rotations import rotate, spin
+from .rotations import conjugate, rotate, spin, spin_change
+from .terms import Term
 
 __all__ = ["SlippingSprings"]
 
@@ -44,20 +50,20 @@ class SlippingSprings:
     limit: Any
     slip_n: tuple[Any, Any]
 
-    def _gap(self) -> Any:
-        return self.fields.gap(self.fields.w)
-
     def _axes(self) -> tuple[Any, Any, Any]:
-        """Along the warp, across it in the plane, and normal, turned with the warp node."""
+        """Along the warp, across it in the plane, and normal, before they turn."""
         fields = self.fields
-        q, _ = fields.rotations(fields.w)
-        along, normal = rotate(q, fields.warp), rotate(q, fields.normal)
-        return along, cross(normal, along), normal
+        return fields.warp, cross(fields.normal, fields.warp), fields.normal
 
-    def force(self) -> Any:
-        """The force f that pulls the weft node back [N]."""
+    def gap(self) -> Any:
+        """The gap Δ in the frame of the warp node, G [mm]."""
+        q, _ = self.fields.rotations(self.fields.w)
+        return rotate(conjugate(q), self.fields.gap(self.fields.w))
+
+    def force(self, gap: Any) -> Any:
+        """The force that pulls the weft node back [N], in the frame of the warp node."""
         along, across, normal = self._axes()
-        trial = self.k * (self._gap() - self.slip_n[0] * along - self.slip_n[1] * across)
+        trial = self.k * (gap - self.slip_n[0] * along - self.slip_n[1] * across)
         lifting = dot(trial, normal) * normal
         sliding = trial - lifting
         size = sqrt(dot(sliding, sliding) + TINY_FORCE**2)
@@ -66,26 +72,35 @@ class SlippingSprings:
     def slip(self) -> tuple[Any, Any]:
         """S at the end of the step [mm]."""
         along, across, _ = self._axes()
-        place = self._gap() - self.force() / self.k
+        gap = self.gap()
+        place = gap - self.force(gap) / self.k
         return dot(place, along), dot(place, across)
 
-    def work(self) -> Any:
-        """Virtual work f · δΔ − (Δ × f) · δφ, φ the turn of the warp node."""
-        fields, force = self.fields, self.force()
-        theta, turned = (rotation_part(fields.ends(v)[0]) for v in (fields.w, fields.test))
-        opened = translation_part(fields.test.dx(0))
-        moment = cross(self._gap(), force)
-        # The spin is that in the turning frame.
-        turn = rotate(fields.rotations(fields.w)[0], spin(theta, turned))
-        return (dot(force, opened) - dot(moment, turn)) * fields.point
+    def term(self, name: str) -> Term:
+        """Work of the force, with energy and loss."""
+        fields = self.fields
+        gap = variable(self.gap())
+        force = self.force(gap)
+        stiffness = diff(force, gap)
+        q, _ = fields.rotations(fields.w)
+        theta, v, dw = (
+            rotation_part(fields.ends(f)[0]) for f in (fields.w, fields.test, fields.trial)
+        )
+        spun, turned = spin(theta, v), spin(theta, dw)
+        opened = rotate(conjugate(q), translation_part(fields.test.dx(0)))
+        by_v = opened - cross(spun, gap)
+        by_dw = rotate(conjugate(q), translation_part(fields.trial.dx(0))) - cross(turned, gap)
+        both = -dot(force, cross(turned, opened) + cross(spun, by_dw))
+        both -= spin_change(theta, v, dw, spun, cross(gap, force))
+        tangent = dot(dot(stiffness, by_dw), by_v) + both
+        point = fields.point
+        energy = dot(force, force) / (2 * self.k) * point
+        loss = self._loss(force) * point
+        work = dot(force, by_v) * point
+        # F is the gradient of a potential in G, sliding or not: the limit does not depend on G.
+        return Term(name, "crossovers", work, tangent * point, energy, loss, symmetric=True)
 
-    def energy(self) -> Any:
-        """Stored in the springs, |f|²/2k [N mm]."""
-        force = self.force()
-        return dot(force, force) / (2 * self.k) * self.fields.point
-
-    def loss(self) -> Any:
+    def _loss(self, force: Any) -> Any:
         """Energy f · (s − s_n) that slipping takes over the step [N mm]."""
-        force, slip = self.force(), self.slip()
-        rates = zip(self._axes()[:2], slip, self.slip_n, strict=True)
-        return sum(dot(force, axis) * (s - s_n) for axis, s, s_n in rates) * self.fields.point
+        changes = zip(self._axes()[:2], self.slip(), self.slip_n, strict=True)
+        return sum(dot(force, axis) * (s - s_n) for axis, s, s_n in changes)

@@ -27,6 +27,10 @@ __all__ = ["Newton", "Outcome"]
 #: will not come back: early in a step stiff tows make it rise by orders, growth alone is no sign.
 RUNAWAY = 1e2
 
+#: A factorisation serves once more where the residual, if it fell again by the factor it fell by
+#: last, would be below this share of the tolerance: the tangent has then hardly changed.
+ENOUGH = 0.01
+
 #: Iterations within which the smallest residual must have halved, or the step has failed.
 PATIENCE = 4
 
@@ -78,6 +82,8 @@ class Newton:
         self._F, self._free, self._held = net.vector(), net.vector(), net.vector()
         first = int(net.global_blocks[0]) * 6 if net.owned else 0
         self._fixed = np.asarray(fixed, dtype=PETSc.IntType) - first
+        # A row of PETSc's triples for each.
+        self._fixed_rows = np.asarray(fixed, dtype=PETSc.IntType)[:, None]
         self._held.array[self._fixed] = 1.0
         self._free.set(1.0)
         self._free.axpy(-1.0, self._held)
@@ -85,13 +91,14 @@ class Newton:
         self._history: list[float] = []
         self._fresh = True
         self._refused = ""
+        self._symmetric = False
         self._solvers: dict[bool, PETSc.SNES] = {}
         self._whole: dict[bool, PETSc.Mat] = {}
 
     @property
     def snes(self) -> PETSc.SNES:
         """The solver for a tangent as symmetric as the present one. Collective."""
-        symmetric = self.system.symmetric
+        symmetric = self._symmetric = self.system.symmetric
         if symmetric not in self._solvers:
             self._solvers[symmetric] = self._solver(symmetric)
         return self._solvers[symmetric]
@@ -112,6 +119,8 @@ class Newton:
             # Orderings found best on these nets: METIS on one rank, AMF on several.
             "mat_mumps_icntl_7": 5 if net.comm.size == 1 else 2,
             "mat_mumps_icntl_14": 50,
+            # No scaling: on these nets it only costs time.
+            "mat_mumps_icntl_8": 0,
         }.items():
             if not options.hasName(prefix + key):
                 options[prefix + key] = value
@@ -204,20 +213,30 @@ class Newton:
         self.residual(x, F, self._target)
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
-        self._tangent(P)
-        # SNES solves with the residual as it stands here.
+        if not self._nearly_done():
+            self._tangent(P)
+        # SNES factorises when P changes, and solves with the residual as it stands here.
         self._take_prescribed(self._F)
+
+    def _nearly_done(self) -> bool:
+        """Whether the factorisation of the last iteration should bring convergence in this one."""
+        if len(self._history) < 2:
+            return False
+        before, now = self._history[-2:]
+        return now**2 < ENOUGH * self.force_tolerance * before
 
     def _tangent(self, P: PETSc.Mat) -> None:
         """Assemble the tangent and copy it to P, with one on the diagonal for prescribed rows.
 
         Their columns go too, so that P is symmetric; what they do is in ``_take_prescribed``.
         """
-        A = self._whole[self.system.symmetric]
+        A = self._whole[self._symmetric]
         self.system.tangent(A)
         A.copy(P, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         P.diagonalScale(self._free, self._free)
-        P.setDiagonal(self._held, PETSc.InsertMode.ADD_VALUES)
+        rows = self._fixed_rows
+        P.setValuesRCV(rows, rows, np.ones(rows.shape))
+        P.assemble()
         self.factorisations += 1
 
     def _take_prescribed(self, b: PETSc.Vec) -> None:
@@ -228,7 +247,7 @@ class Newton:
         moved, force = b.duplicate(), b.duplicate()
         moved.pointwiseMult(self._held, b)
         if moved.norm(PETSc.NormType.NORM_INFINITY) > 0.0:
-            self._whole[self.system.symmetric].mult(moved, force)
+            self._whole[self._symmetric].mult(moved, force)
             force.pointwiseMult(force, self._free)
             b.axpy(-1.0, force)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from ufl import variable
 
 from .. import _dolfinx
 from .._dolfinx import Function
@@ -96,16 +97,13 @@ class Crossings:
 
         self._space = _dolfinx.constants_per_cell(fields.mesh, 1)
         self.per_time = number(1.0)
-        gamma = crossover.shear_angle(fields, fields.w)
+        change = crossover.shear_angle_change(fields)
+        gamma = variable(change.value)
         gamma_n = Function(self._space)
         remembered: list[tuple[str, Any, Any]] = [("shear angle", gamma_n, gamma)]
         self.terms = [
             self._springs(law, number, remembered),
-            energy_term(
-                "normal alignment",
-                fields,
-                crossover.alignment_energy(fields, number(law.alignment)),
-            ),
+            crossover.alignment_term(fields, number(law.alignment)),
         ]
         moments = []
         for piece in turning:
@@ -117,15 +115,16 @@ class Crossings:
             at = Crossing(gamma, gamma_n, self.per_time, number, past)
             moment = piece.moment(at)
             moments.append(moment)
-            work = crossover.turning_work(fields, moment, gamma)
+            energy = loss = None
             if piece is turning[0]:
                 energy = crossover.rotational_energy(fields, number(law.k1), number(law.k3))
-                self.terms.append(
-                    work_term(piece.name, fields, work, energy=energy, symmetric=True)
-                )
             else:
-                loss = crossover.turning_loss(fields, moment, at.change)
-                self.terms.append(work_term(piece.name, fields, work, loss=loss, symmetric=True))
+                loss = at.change
+            self.terms.append(
+                crossover.turning_term(
+                    piece.name, fields, moment, gamma, change, energy=energy, loss=loss
+                )
+            )
             for name, value in piece.history(at).items():
                 remembered.append((f"{piece.name}: {name}", past(name), value))
         self._remember(histories, remembered)
@@ -144,7 +143,7 @@ class Crossings:
         springs = slip.SlippingSprings(fields, k, number(law.slip_limit), slip_n)
         for direction, past, new in zip(("along", "across"), slip_n, springs.slip(), strict=True):
             remembered.append((f"slip {direction} the warp", past, new))
-        return work_term(name, fields, springs.work(), energy=springs.energy(), loss=springs.loss())
+        return springs.term(name)
 
     def _without_crossings(self, turning: Sequence[ShearLaw], histories: Histories) -> None:
         """The same collective calls on a rank that has no crossing of its own."""

@@ -8,6 +8,8 @@ solution.
 
 from __future__ import annotations
 
+import math
+
 from mpi4py import MPI
 
 import numpy as np
@@ -72,13 +74,12 @@ class Predictor:
         self.order = 0
 
     def _continued(self, h: float, order: int) -> Array:
-        lengths = self.lengths[: order + 1]
+        lengths = self.lengths[: order + 1].tolist()
         # Times of the past steps' middles and of the next one's, counted from now.
-        middles = lengths / 2.0 - np.cumsum(lengths)
+        middles = [length / 2.0 - sum(lengths[: k + 1]) for k, length in enumerate(lengths)]
         weights = [
-            np.prod(
-                [(h / 2.0 - other) / (own - other) for j, other in enumerate(middles) if j != k]
-            )
-            for k, own in enumerate(middles)
+            math.prod((h / 2.0 - other) / (own - other) for other in middles if other != own)
+            for own in middles
         ]
-        return np.tensordot(h * np.array(weights) / lengths, self.past[: order + 1], axes=1)
+        scale = [h * weight / length for weight, length in zip(weights, lengths, strict=True)]
+        return np.tensordot(scale, self.past[: order + 1], axes=1)
