@@ -235,7 +235,8 @@ class Newton:
         A.copy(P, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         P.diagonalScale(self._free, self._free)
         rows = self._fixed_rows
-        P.setValuesRCV(rows, rows, np.ones(rows.shape))
+        if len(rows):
+            P.setValuesRCV(rows, rows, np.ones(rows.shape))
         P.assemble()
         self.factorisations += 1
 
