@@ -9,10 +9,11 @@ from scipy.interpolate import CubicSpline
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop.cantilever import Cantilever
-from fabric_fenicsx.loop.fitting import fit, fit_from_grid
+from fabric_fenicsx.loop.fitting import fit
 from fabric_fenicsx.loop.hanging import HangingTow
 from fabric_fenicsx.loop.measurement import CantileverRig, FabricKeys, Measurement, Run
 from fabric_fenicsx.loop.search import diagnose_test
+from fabric_fenicsx.loop.starts import fit_from_grid
 
 WIDTH, HEIGHT, SPACING = 4.57, 0.04, 12.0
 DENSITY = 0.6  # kg/m²

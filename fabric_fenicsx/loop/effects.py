@@ -45,6 +45,8 @@ class Parameter:
         share_of: "duration", "angle", "rate" or "travel": starts and bounds are shares of the
             longest run, or of the largest shear angle, rate or displacement in the data; of a
             cantilever "curvature" or "moment", the largest of them in the fitted baseline.
+        jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
+            for on both sides.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Parameter:
     amplitude: bool = False
     meaning: str = ""
     share_of: str = ""
+    jumps: bool = False
 
     @property
     def one_sided(self) -> bool:

@@ -15,23 +15,16 @@ from .experiment import Experiment, Flags
 
 __all__ = [
     "Fit",
-    "Signature",
     "fit",
-    "fit_from_grid",
     "orthogonal_to",
     "parameters_of",
-    "signatures",
     "weighted",
 ]
 
 Array = npt.NDArray[np.float64]
 
-#: Amplitudes are differentiated here rather than at zero, where |·| and friction have a corner.
-SMALL = 1e-9
 #: Parameters whose estimates correlate more than this are told in the report.
 CORRELATED = 0.98
-#: Forms that leave this many times more than the best one, to first order, are not fitted.
-HOPELESS = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +41,8 @@ class Fit:
         expected: the model there, (n,).
         used: readings that were fitted, (n,).
         weight: of the readings, (n,).
-        leverage: variance of the expected reading that the parameters' errors make, for a noise
-            of one unit, (n,).
+        spread: weighted change of the expected readings with one standard error, for a noise of
+            one unit, of independent combinations of the parameters, (n, n_values).
     """
 
     variants: tuple[Variant, ...]
@@ -61,7 +54,7 @@ class Fit:
     expected: Array
     used: npt.NDArray[np.bool_]
     weight: Array
-    leverage: Array
+    spread: Array
 
     @property
     def sum_of_squares(self) -> float:
@@ -77,6 +70,20 @@ class Fit:
         """Root mean square of the weighted residual at these readings; NaN if there are none."""
         own = (self.residual * self.weight)[rows]
         return float(np.sqrt(np.mean(own**2))) if len(own) else float("nan")
+
+    def foreseen(self, rows: Flags) -> float:
+        """Root mean square of the weighted residual there, in units that prediction allows for.
+
+        A prediction is as uncertain as the parameters it is made with, and its errors go together:
+        with G the spread there, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum of squares, by
+        Woodbury's identity. NaN if there are none.
+        """
+        r, G = (self.residual * self.weight)[rows], self.spread[rows]
+        if len(r) == 0:
+            return float("nan")
+        Gr = G.T @ r
+        left = float(r @ r - Gr @ np.linalg.solve(np.eye(G.shape[1]) + G.T @ G, Gr))
+        return float(np.sqrt(max(left, 0.0) / len(r)))
 
     def errors_at(self, noise: float) -> dict[str, float]:
         """Standard errors for a noise, or for the scatter about the fit where that is larger."""
@@ -159,7 +166,7 @@ def fit(
     J = jacobian(result.x)
     if not np.isfinite(J).all():
         raise SolveError(f"a derivative in {', '.join(names)} is not finite at the fit")
-    std, correlation, covariance = _uncertainty(J)
+    std, correlation, root = _uncertainty(J)
     every = np.column_stack([model(result.x)[1][name] * readings.weight for name in names])
     near = np.triu(np.abs(correlation) > CORRELATED, 1)
     return Fit(
@@ -172,7 +179,7 @@ def fit(
         expected=expected,
         used=used,
         weight=readings.weight,
-        leverage=np.einsum("ij,jk,ik->i", every, covariance, every),
+        spread=every @ root,
     )
 
 
@@ -192,7 +199,7 @@ def _without_parameters(
         expected=expected,
         used=used,
         weight=readings.weight,
-        leverage=np.zeros(len(expected)),
+        spread=np.zeros((len(expected), 0)),
     )
 
 
@@ -227,111 +234,6 @@ def without(experiment: Experiment, model: Fit, variants: Sequence[Variant]) -> 
     )
 
 
-def fit_from_grid(
-    experiment: Experiment,
-    base: Fit,
-    variants: Sequence[Variant],
-    *,
-    starts: int = 2,
-    evaluations: int = 60,
-    robust: float | None = None,
-) -> list[Fit]:
-    """Add one of several forms of an effect to a fitted model.
-
-    Every form is first judged to first order, from its signatures; the most promising starts of
-    each are fitted, and of all forms no more than fit nearly as well as the best to first order.
-
-    Args:
-        experiment: the test.
-        base: the model so far.
-        variants: the forms; those that share a parameter with the model are left out.
-        starts: how many starts of each form are followed.
-        evaluations: of the model at most, from each.
-        robust: see fit.
-
-    Returns:
-        The model with each form that has a solution.
-    """
-    rows = base.used
-    weight = base.weight[rows]
-    observed = experiment.readings.observed[rows]
-    promising: list[tuple[float, int, Variant, dict[str, float]]] = []
-    for variant in variants:
-        if set(base.values) & {p.name for p in variant.parameters}:
-            continue
-        own: list[tuple[float, int, Variant, dict[str, float]]] = []
-        for one in signatures(experiment, base, variant, amplitudes=True):
-            r = (observed - one.expected[rows]) * weight
-            J = np.column_stack([c[rows] * weight for c in one.slopes.values()])
-            if not (np.isfinite(J).all() and np.isfinite(r).all()):
-                continue
-            scale = np.linalg.norm(J, axis=0)
-            scale[scale == 0.0] = 1.0
-            step = np.linalg.lstsq(J / scale, r, rcond=1e-10)[0] / scale
-            moved = dict(one.at)
-            for name, change in zip(one.slopes, step.tolist(), strict=True):
-                moved[name] += change
-            for p in variant.amplitudes:
-                moved[p.name] = max(moved[p.name], _least(p, moved[p.name]))
-            left = float(np.sum((r - J @ step) ** 2))
-            own.append((left, len(promising) + len(own), variant, moved))
-        promising += sorted(own)[:starts]
-    promising.sort()
-    fits: list[Fit] = []
-    for left, _, variant, moved in promising:
-        # To first order is not the last word: what is within a factor is fitted.
-        if fits and left > HOPELESS * promising[0][0] and len(fits) > 1:
-            break
-        try:
-            model = (*base.variants, variant)
-            fits.append(fit(experiment, model, moved, rows, evaluations=evaluations, robust=robust))
-        except SolveError:
-            continue
-    return fits
-
-
-@dataclass(frozen=True, slots=True)
-class Signature:
-    """The model with a little of an effect.
-
-    Attributes:
-        at: values of all parameters.
-        expected: readings there, (n,).
-        slopes: their derivatives, (n,) each, by parameter of the fitted model and by amplitude of
-            the effect.
-    """
-
-    at: dict[str, float]
-    expected: Array
-    slopes: dict[str, Array]
-
-
-def signatures(
-    experiment: Experiment, base: Fit, variant: Variant, *, amplitudes: bool
-) -> list[Signature]:
-    """The model's sensitivities to an effect, for each shape of it.
-
-    Args:
-        experiment: the test.
-        base: the model so far.
-        variant: the effect's form.
-        amplitudes: also at the starts of its amplitudes, where it has any; else all but at zero.
-
-    Returns:
-        One for each of them where the model has a solution.
-    """
-    found = []
-    names = [*base.values, *(p.name for p in variant.amplitudes)]
-    for shape in variant.grid(amplitudes=amplitudes):
-        at = base.values | {p.name: SMALL for p in variant.amplitudes} | shape
-        try:
-            expected, slopes = experiment.predict((*base.variants, variant), at)
-        except SolveError:
-            continue
-        found.append(Signature(at, expected, {name: slopes[name] for name in names}))
-    return found
-
-
 def orthogonal_to(J: Array, columns: Array) -> Array:
     """The part of columns, (n, k), that no combination of those of J, (n, m), can make."""
     scale = np.linalg.norm(J, axis=0)
@@ -345,15 +247,10 @@ def orthogonal_to(J: Array, columns: Array) -> Array:
     return columns
 
 
-def _least(p: Parameter, value: float) -> float:
-    """A start that is not on the bound of a one-sided amplitude."""
-    return 1e-3 * abs(value) + SMALL if p.one_sided else value
-
-
 def _uncertainty(J: Array) -> tuple[Array, Array, Array]:
-    """Standard errors (infinite where nothing depends on it), correlations, covariance.
+    """Standard errors (infinite where nothing depends on it), correlations, root of the covariance.
 
-    All for a noise of one unit.
+    All for a noise of one unit; the covariance is root rootᵀ, without what nothing depends on.
     """
     scale = np.linalg.norm(J, axis=0)
     dead = scale == 0.0
@@ -363,5 +260,7 @@ def _uncertainty(J: Array) -> tuple[Array, Array, Array]:
     scaled = np.linalg.pinv(information, rcond=1e-14, hermitian=True)
     std = np.sqrt(np.maximum(np.diag(scaled), 0.0))
     correlation = scaled / np.maximum(np.outer(std, std), 1e-300)
-    covariance = np.where(np.outer(dead, dead), 0.0, scaled / np.outer(safe, safe))
-    return np.where(dead, np.inf, std / safe), correlation, covariance
+    values, vectors = np.linalg.eigh(scaled)
+    root = vectors * np.sqrt(np.maximum(values, 0.0)) / safe[:, None]
+    root[dead] = 0.0
+    return np.where(dead, np.inf, std / safe), correlation, root

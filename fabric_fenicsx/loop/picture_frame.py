@@ -27,8 +27,9 @@ from .effects import Effect, FrameVariant, Parameter, Variant, scaled
 from .experiment import Readings
 from .marching import Marched, Varying
 from .measurement import Measurement
+from .noise import estimated_noise
 from .picture_frame_effects import PICTURE_FRAME_EFFECTS
-from .programme import Programme, programme
+from .programme import Programme, frame_programme
 
 __all__ = ["PictureFrame"]
 
@@ -57,7 +58,10 @@ class PictureFrame:
         self.noise = _common_noise(measurements)
         runs = [(m, run) for m in measurements for run in m.runs]
         programmes = [
-            programme(run.columns["time_s"], run.columns["displacement_mm"]) for _, run in runs
+            frame_programme(
+                run.columns["time_s"], run.columns["displacement_mm"], m.rig.frame_length_mm
+            )
+            for m, run in runs
         ]
         self._lay_out(programmes)
         self._rig = {
@@ -94,18 +98,21 @@ class PictureFrame:
     def _leave_out_uncertain(self, doubt: Array) -> None:
         """Leave out readings whose rate is so uncertain [rad/s] that the dashpot's force is.
 
-        By more than a reading scatters, with the dashpot of a first fit; never more than half.
+        By more than a reading scatters, with the dashpot of a first fit, which also says how much
+        that is where it is not given; never more than half.
         """
         rows = self.readings.fit
         _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
         J = np.column_stack([slopes[p.name] for p in self.baseline])
-        if self.noise is None or rows.sum() <= len(self.baseline):
+        if rows.sum() <= len(self.baseline):
             return
         k = np.linalg.lstsq(J[rows], self.readings.observed[rows], rcond=None)[0]
+        residual = self.readings.observed - J @ k
+        noise = self.noise or estimated_noise(residual, self.readings, rows)
         factor = self._at_readings(self._kinematics(self._travel(None, {}), {})["factor"].value)
         # Where nothing is known of the rate the programme has left the reading out itself.
         doubt = np.where(np.isfinite(doubt), doubt, 0.0)
-        clear = np.abs(k[-1] * factor * doubt) < self.noise
+        clear = ~(np.abs(k[-1] * factor * doubt) >= noise)
         if (rows & clear).sum() > rows.sum() / 2:
             self.readings = replace(self.readings, usable=self.readings.usable & clear)
 

@@ -54,6 +54,7 @@ TRAVEL = Parameter(
     amplitude=True,
     meaning="crosshead travel before engagement",
     share_of="travel",
+    jumps=True,
 )
 
 

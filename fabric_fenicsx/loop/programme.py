@@ -7,14 +7,14 @@ between two readings does not smear the rates on both sides of it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
-__all__ = ["Programme", "programme"]
+__all__ = ["Programme", "frame_programme", "programme"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -51,16 +51,56 @@ class Programme:
     certain: Flags
 
 
-def programme(time: Array, displacement: Array) -> Programme:
+def frame_programme(time: Array, displacement: Array, frame_length: float) -> Programme:
+    """The programme of a picture frame, driven at constant speeds or at constant shear rates.
+
+    Whichever of the two leaves fewer readings in doubt: legs at a constant rate are straight in
+    the one of crosshead and angle that was driven, and a few readings tell their rate exactly.
+
+    Args:
+        time: of the readings [s], increasing, (n,).
+        displacement: of the crosshead from the square frame [mm], (n,).
+        frame_length: [mm].
+    """
+    resolution = _resolution(displacement)
+    crosshead = programme(time, displacement, resolution)
+    gamma = np.pi / 2 - 2 * np.arccos((np.sqrt(2.0) + displacement / frame_length) / 2)
+    steepest = float(np.max(1.0 / np.sin(np.pi / 4 - gamma / 2)))
+    angle = programme(time, gamma, resolution * steepest / frame_length)
+    if not _clearer(angle, crosshead):
+        return crosshead
+    theta = np.pi / 4 - angle.displacement / 2
+    lever = frame_length * np.sin(theta)
+    return replace(
+        angle,
+        displacement=frame_length * (2 * np.cos(theta) - np.sqrt(2.0)),
+        rate=lever * angle.rate,
+        doubt=frame_length * np.sin(np.pi / 4 - gamma / 2) * angle.doubt,
+    )
+
+
+def _clearer(one: Programme, other: Programme) -> bool:
+    """Whether the rates of a record are known better from one programme than from another."""
+
+    def doubt(p: Programme) -> float:
+        return float(np.median(p.doubt) / max(float(np.abs(p.rate).max()), 1e-300))
+
+    counts = int(one.certain.sum()), int(other.certain.sum())
+    return counts[0] > counts[1] or (counts[0] == counts[1] and doubt(one) < doubt(other))
+
+
+def programme(time: Array, displacement: Array, resolution: float | None = None) -> Programme:
     """Find the corners of a record and the rates between them.
 
     Args:
         time: of the readings [s], increasing, (n,).
-        displacement: of the crosshead [mm], (n,).
+        displacement: of the crosshead [mm], or another measure of the motion, (n,).
+        resolution: half of the last place that was recorded; by default as the values show.
     """
-    corners = _corners(time, displacement)
+    if resolution is None:
+        resolution = _resolution(displacement)
+    corners = _corners(time, displacement, resolution)
     edges = [-np.inf, *corners, np.inf]
-    resolution = _resolution(displacement)
     rate = np.zeros_like(time)
     top = float(np.abs(np.diff(displacement) / np.diff(time)).max())
     near = 1e-6 * float(np.ptp(time))
@@ -75,14 +115,20 @@ def programme(time: Array, displacement: Array) -> Programme:
         own = (time[inside] > low + near) | ~np.isfinite(low)
         rate[inside[own]], doubt[inside[own]] = rates[own], unsure[own]
     certain &= doubt < DOUBT * top
+    # By itself among readings in doubt, a reading's two estimates may agree by chance.
+    beside = np.zeros_like(certain)
+    beside[1:] |= certain[:-1]
+    beside[:-1] |= certain[1:]
+    certain &= beside | (doubt <= 4.0 * resolution / np.gradient(time) + 1e-9 * top)
     for corner in corners:
         at = np.abs(time - corner) <= near
         if at.any():
             certain[at] = False
         else:
             k = int(np.searchsorted(time, corner))
-            # Whether it was as sharp as it seems nobody saw.
-            certain[k - 1 : k + 1] = False
+            # Whether it was as sharp as it seems nobody saw, but for a reading in line with others.
+            certain[k - 1] &= _in_line(time, displacement, k - 1, -1, resolution)
+            certain[k] &= _in_line(time, displacement, k, 1, resolution)
             # Reached along the piece before it.
             value = displacement[k - 1] + rate[k - 1] * (corner - time[k - 1])
             added.append((corner, float(value), float(rate[k - 1])))
@@ -105,6 +151,18 @@ def programme(time: Array, displacement: Array) -> Programme:
     return Programme(
         columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3].astype(np.int64), doubt, certain
     )
+
+
+def _in_line(time: Array, values: Array, k: int, way: int, resolution: float) -> bool:
+    """Whether a reading lies on the line through the two next to it on one side, to rounding."""
+    i, j = k + way, k + 2 * way
+    if min(i, j) < 0 or max(i, j) >= len(time):
+        return False
+    slope = (values[j] - values[i]) / (time[j] - time[i])
+    # Each of the three is rounded, and the line is carried on by one interval.
+    allowed = resolution * (1.0 + 3.0 * abs((time[k] - time[i]) / (time[j] - time[i])))
+    allowed += 1e-9 * float(np.ptp(values))
+    return bool(abs(values[i] + slope * (time[k] - time[i]) - values[k]) <= allowed)
 
 
 def _between(
@@ -146,16 +204,24 @@ def _rates(time: Array, displacement: Array, resolution: float, top: float) -> t
     if count < 3:
         slope = float((displacement[-1] - displacement[0]) / np.ptp(time)) if count == 2 else 0.0
         return np.full(count, slope), np.full(count, np.inf)
-    if np.ptp(displacement) <= 2.0 * resolution:
+    if np.ptp(displacement) <= 2.0 * resolution * (1.0 + 1e-6):
         return np.zeros(count), np.zeros(count)
     step = np.ptp(time) / (count - 1)
     # Wide enough for the rounding of the record to average out.
     half = int(np.clip(np.ceil(resolution / (0.1 * DOUBT * top * step)), 1, 6))
     near, far = np.empty(count), np.empty(count)
     for i in range(count):
-        near[i] = _slope_at(time, displacement, i, half, 2)
+        # Of three points the same parabola twice would tell nothing.
+        near[i] = _slope_at(time, displacement, i, half, 2 if count > 3 else 1)
         far[i] = _slope_at(time, displacement, i, 2 * half, 4)
-    return far, np.abs(far - near)
+    doubt = np.abs(far - near)
+    for i in range(1, count - 1):
+        # At rest, as far as the record can tell.
+        if np.ptp(displacement[i - 1 : i + 2]) <= 2.0 * resolution * (1.0 + 1e-6):
+            far[i], doubt[i] = 0.0, 0.0
+    if count == 3 and not _in_line(time, displacement, 2, -1, resolution):
+        doubt[:] = np.inf
+    return far, doubt
 
 
 def _slope_at(time: Array, values: Array, i: int, half: int, degree: int) -> float:
@@ -169,25 +235,23 @@ def _slope_at(time: Array, values: Array, i: int, half: int, degree: int) -> flo
     return float(fitted[-2]) / scale
 
 
-def _corners(time: Array, displacement: Array) -> list[float]:
+def _corners(time: Array, displacement: Array, resolution: float) -> list[float]:
     """Times at which the speed jumps."""
     count = len(time)
     if count < 6:
         return []
     speed = np.diff(displacement) / np.diff(time)
-    resolution = _resolution(displacement)
     doubt = 4.0 * resolution / np.diff(time)
     top = float(np.abs(speed).max())
     found: list[float] = []
     for j in range(1, len(speed) - 1):
         # Across interval j, from the interval before to the one after it.
         jump = abs(speed[j + 1] - speed[j - 1])
-        before = abs(speed[j - 1] - speed[j - 3]) if j >= 3 else 0.0
-        after = abs(speed[j + 3] - speed[j + 1]) if j + 3 < len(speed) else 0.0
-        if j < 3:
-            before = after
-        if j + 3 >= len(speed):
-            after = before
+        before, after = _drift(speed, j - 1, -1), _drift(speed, j + 1, 1)
+        before = after if before is None else before
+        after = before if after is None else after
+        if before is None or after is None:
+            continue
         if jump < max(LEAST_JUMP * top, doubt[j - 1] + doubt[j + 1]):
             continue
         if jump < JUMP_RATIO * max(before, after):
@@ -204,3 +268,15 @@ def _corners(time: Array, displacement: Array) -> list[float]:
             if not found or corner - found[-1] > slack:
                 found.append(float(corner))
     return found
+
+
+def _drift(speed: Array, j: int, way: int) -> float | None:
+    """Change of speed over two intervals, from interval j on; None at the end of the record.
+
+    From two, or twice that of one: the next corner may be that near.
+    """
+    changes = []
+    for steps in (1, 2):
+        if 0 <= j + way * steps < len(speed):
+            changes.append(2.0 / steps * abs(float(speed[j + way * steps] - speed[j])))
+    return min(changes, default=None)

@@ -17,7 +17,8 @@ from scipy.stats import chi2
 
 from .effects import Effect, Variant
 from .experiment import Experiment
-from .fitting import Fit, orthogonal_to, signatures, weighted
+from .fitting import Fit, orthogonal_to, weighted
+from .starts import signatures
 
 __all__ = ["score_tests"]
 

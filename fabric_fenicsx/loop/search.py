@@ -21,9 +21,10 @@ from ..errors import SolveError
 from .diagnosis import Candidate, Diagnosis, Verdict
 from .effects import Effect
 from .experiment import Experiment
-from .fitting import Fit, fit, fit_from_grid, without
+from .fitting import Fit, fit, without
 from .noise import Whiteness, estimated_noise, lone, spikes, whiteness
 from .scores import score_tests
+from .starts import fit_from_grid
 
 __all__ = ["diagnose_test"]
 
@@ -31,8 +32,9 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Model = tuple[Fit, tuple[Effect, ...]]
 
-#: Probability of a score by chance, over all candidates together, below which it is followed.
-ALARM = 0.01
+#: Probability of a score by chance, over all candidates together, below which it is followed
+#: where the baseline's residual is otherwise noise.
+ALARM = 1e-3
 #: Held-out error over noise up to which a model explains the data.
 NEAR = 1.15
 #: χ² + k ln n by which a second effect must win, and by which a rival may lose.
@@ -46,6 +48,8 @@ FAR = 3.0
 HOPELESS = 1e-8
 #: Share of the range that a reading is good to where no noise is given.
 READ = 0.005
+#: Times that readings are left out, from ever better models.
+ROUNDS = 3
 #: Effects at most: any three of them would fit almost anything.
 MOST = 2
 #: Effects whose pairs with every other are tried where no single one explains the data.
@@ -116,19 +120,25 @@ class _Search:
     def run(self) -> Diagnosis:
         """See diagnose_test."""
         candidates, singles = self._tried()
-        if singles and self._leave_out(singles[0].fit or self.baseline):
+        for _ in range(ROUNDS):
             # A spike is seen better once the large part of the residual is gone.
+            if not (singles and self._leave_out(singles[0].fit or self.baseline)):
+                break
             candidates, singles = self._tried()
         if not self.given and singles:
             self.noise = self._noise_of(singles[0].fit or self.baseline)
         nearest: Model = (self.baseline, ())
         explained = self._explains(self.baseline)
-        quiet = explained and all(c.p_value >= ALARM for c in candidates)
-        if not quiet:
+        # What the fitted readings do not show cannot be learned from them.
+        silent = self._fits(self.baseline) and all(c.p_value >= ALARM for c in candidates)
+        quiet = explained and silent
+        if not silent:
             nearest, explained = self._choose(singles)
             if not explained and self._leave_out(nearest[0]):
                 candidates, singles = self._tried()
                 nearest, explained = self._choose(singles)
+            if self._explains(self.baseline) and not self._foretells(nearest[0]):
+                nearest, quiet = (self.baseline, ()), True
         for candidate in candidates:
             if candidate.fit is not None:
                 candidate.holdout = self._holdout(candidate.fit)
@@ -209,8 +219,9 @@ class _Search:
         if not ones:
             return (self.baseline, ()), False
         single, explained = self._first_that_explains(ones)
-        # Only where the residual still shows structure is a second effect looked for.
-        if explained and not self._whiteness(single[0]).structured:
+        # Only where the residual still shows structure, or a prediction leans on how uncertain it
+        # is, is a second effect looked for.
+        if explained and not self._whiteness(single[0]).structured and self._foresees(single[0]):
             return single, True
         pairs = self._pairs(singles)
         if not pairs:
@@ -266,24 +277,35 @@ class _Search:
             model.residual, self.noise, self.given, len(model.values), self.readings, self.rows
         )
 
-    def _explains(self, model: Fit) -> bool:
-        """Whether a model leaves noise: in size on what was fitted and on what was held out."""
-        count = int(self.rows.sum())
-        near = self._near
+    def _fits(self, model: Fit) -> bool:
+        """Whether a model leaves noise, in size, on what was fitted."""
         if self.given:
             white = self._whiteness(model)
             if min(white.blocks, white.lags, white.period) < HOPELESS:
                 return False
-        scatter = np.sqrt(model.sum_of_squares / model.freedom) / near
-        if scatter > max(1.1, _upper(model.freedom)):
+        scatter = np.sqrt(model.sum_of_squares / model.freedom) / self._near
+        return bool(scatter <= max(1.1, _upper(model.freedom)))
+
+    def _foretells(self, model: Fit) -> bool:
+        """Whether a model predicts parts of the fitted readings better than the baseline does."""
+        return self._cross_validated(model) < self._cross_validated(self.baseline)
+
+    def _explains(self, model: Fit) -> bool:
+        """Whether a model leaves noise, on what was fitted and on what was held out."""
+        if not self._fits(model):
             return False
         out = self._held_rows()
         if out.any():
-            # A prediction is as uncertain as the parameters it is made with.
-            doubt = float(np.sqrt(1.0 + np.mean(model.leverage[out])))
-            limit = max(NEAR, _upper(int(out.sum()))) * doubt
-            return bool(self._holdout(model) / near <= limit)
-        return count > len(model.values)
+            return model.foreseen(out) <= self._limit(out)
+        return int(self.rows.sum()) > len(model.values)
+
+    def _foresees(self, model: Fit) -> bool:
+        """Whether a model predicts what was held out, as if its parameters were exact."""
+        out = self._held_rows()
+        return not out.any() or model.rms(out) <= self._limit(out)
+
+    def _limit(self, out: Flags) -> float:
+        return self._near * max(NEAR, _upper(int(out.sum())))
 
     @property
     def _near(self) -> float:

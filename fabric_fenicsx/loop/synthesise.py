@@ -23,7 +23,7 @@ from ..rigs.validation import suggestion
 from .drape import Drape
 from .effects import Effect, Variant
 from .experiment import Experiment
-from .fitting import SMALL, orthogonal_to, weighted
+from .fitting import orthogonal_to, weighted
 from .measurement import (
     COLUMNS,
     FILE,
@@ -39,6 +39,7 @@ from .measurement import (
 )
 from .registry import experiment_class
 from .shear_field import ShearLaw, Solve, drape_case, solved_field
+from .starts import SMALL
 
 __all__ = ["Hidden", "Synthetic", "parse_effect", "synthesise", "write_measurement"]
 
