@@ -9,6 +9,7 @@ Offered:
     lagrange, constants_per_cell: blocked function spaces.
     constant: a scalar or vector that a form reads at assembly.
     atan2: the two-argument arc tangent of UFL.
+    NOT_A_NUMBER: why PETSc's Newton stops where the residual is not finite.
     compile_form: UFL to machine code, once for all ranks.
     add_vector, add_matrix: a compiled form's contribution to an array or a matrix.
     cell_scalar: the integral of a compiled functional over this rank's own cells.
@@ -43,6 +44,7 @@ from dolfinx.fem import Function
 from dolfinx.mesh import GhostMode, create_mesh
 
 __all__ = [
+    "NOT_A_NUMBER",
     "Function",
     "add_matrix",
     "add_vector",
@@ -63,6 +65,11 @@ __all__ = [
 version: str = dolfinx.__version__
 
 atan2 = getattr(ufl, "atan2", None) or ufl.atan_2
+
+_REASONS = PETSc.SNES.ConvergedReason
+NOT_A_NUMBER: int = int(
+    getattr(_REASONS, "DIVERGED_FNORM_NAN", None) or _REASONS.DIVERGED_FUNCTION_NANORINF
+)
 
 _BASIX_UFL = hasattr(ufl, "__version__") and not hasattr(ufl, "FiniteElement")
 _FORM_OPTIONS = inspect.signature(fem.form).parameters
@@ -112,8 +119,10 @@ def interval_mesh(
     points = np.ascontiguousarray(points, dtype=np.float64)
     if _BASIX_UFL:
         element = basix.ufl.element("Lagrange", "interval", 1, shape=(gdim,))
-        partitioner = dolfinx.cpp.mesh.create_cell_partitioner(GhostMode.shared_facet)
         arguments = list(inspect.signature(create_mesh).parameters)
+        # Newer ones ask how many cells may meet at a node; tows do not branch.
+        most = [2] if "max_facet_to_cell_links" in arguments else []
+        partitioner = dolfinx.cpp.mesh.create_cell_partitioner(GhostMode.shared_facet, *most)
         if arguments.index("x") < arguments.index("e" if "e" in arguments else "domain"):
             return create_mesh(comm, cells, points, element, partitioner=partitioner)
         return create_mesh(comm, cells, element, points, partitioner=partitioner)
@@ -240,8 +249,9 @@ def cell_dofs(space: Any) -> npt.NDArray[np.int64]:
     """Local block number of each cell's dofs, shape (n_local_cells, dofs_per_cell)."""
     table = space.dofmap.list
     array = table.array if hasattr(table, "array") else table
-    count = local_cells(space.mesh)
-    return np.asarray(array, dtype=np.int64).reshape(count, -1)
+    # A rank without cells has an empty table, which does not say how wide it is.
+    width = space.dofmap.dof_layout.num_dofs
+    return np.asarray(array, dtype=np.int64).reshape(local_cells(space.mesh), width)
 
 
 def local_cells(mesh: Any) -> int:
@@ -252,7 +262,8 @@ def local_cells(mesh: Any) -> int:
 
 def input_nodes(mesh: Any) -> npt.NDArray[np.int64]:
     """Node numbers, as given to interval_mesh, of each local cell, shape (n_local_cells, 2)."""
-    table = mesh.geometry.dofmap
+    tables = getattr(mesh.geometry, "dofmaps", None)
+    table = tables[0] if isinstance(tables, (list, tuple)) else mesh.geometry.dofmap
     array = table.array if hasattr(table, "array") else table
     local = np.asarray(array, dtype=np.int64).reshape(local_cells(mesh), 2)
     return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[local]

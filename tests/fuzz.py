@@ -38,15 +38,15 @@ def mutant(seed: int) -> bytes:
     draw = random.Random(seed)
     text = draw.choice(originals())
     if draw.random() < 0.25:
-        return _scrambled(text.encode(), draw)
+        return scrambled(text.encode(), draw)
     data = yaml.safe_load(text)
     for _ in range(draw.choice((1, 1, 1, 2, 4))):
-        _change(data, draw)
+        change(data, draw)
     return yaml.dump(data, allow_unicode=True).encode("utf-8", "surrogatepass")
 
 
-def _change(data: Any, draw: random.Random) -> None:
-    """Change one place of nested mappings and lists."""
+def change(data: Any, draw: random.Random) -> None:
+    """Change one place of nested mappings and lists, which must not be empty."""
     places = list(_places(data))
     holder, key = draw.choice(places)
     value = holder[key]
@@ -75,7 +75,7 @@ def _places(data: Any) -> Any:
             yield from _places(value)
 
 
-def _scrambled(text: bytes, draw: random.Random) -> bytes:
+def scrambled(text: bytes, draw: random.Random) -> bytes:
     """Text with bytes changed, cut off or put in."""
     for _ in range(draw.choice((1, 2, 8))):
         at = draw.randrange(len(text) + 1)

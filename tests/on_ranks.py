@@ -11,6 +11,7 @@ from mpi4py import MPI
 import numpy as np
 from solve import GivenSection, Statics, plain_net, set_loads, set_state
 
+from fabric_fenicsx.fabric.chains import net_from_lines
 from fabric_fenicsx.solving.model import CrossoverLaw, Model, Support
 
 SECTION = GivenSection((400.0, 150.0, 150.0, 60.0, 50.0, 90.0))
@@ -61,10 +62,24 @@ def solved(comm):
     return statics.displacements, model.shear_angles()
 
 
+def cross_of_two_cells(comm):
+    """Displacements of one warp and one weft cell joined at their ends, pulled at the weft's."""
+    points = np.array([[-4.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, -4.0, 0.0]])
+    net, _ = net_from_lines(points, np.array([[1, 2]]), np.array([[0, 1]]))
+    foot, tip = net.ends[0, :1], int(net.ends[1, 0])
+    supports = [Support(foot, (0, 1, 2, 3, 4, 5))]
+    statics = Statics(
+        Model(net, SECTION, crossovers=LAW, supports=supports, comm=comm), force_tolerance=1e-10
+    )
+    statics.run(2, lambda part: set_loads(statics.model, tip, part * 0.1 * np.eye(6)[2]))
+    return statics.displacements
+
+
 if __name__ == "__main__":
     world = MPI.COMM_WORLD
     norm, residual = tangent_norm(world)
     displacements, gamma = solved(world)
+    cross = cross_of_two_cells(world)
     if world.rank == 0:
         found = {
             "ranks": world.size,
@@ -72,5 +87,6 @@ if __name__ == "__main__":
             "residual": residual,
             "displacements": displacements.tolist(),
             "gamma": gamma.tolist(),
+            "cross": cross.tolist(),
         }
         print(json.dumps(found))

@@ -264,4 +264,7 @@ def test_one_two_and_three_ranks_find_the_same():
         # Newton stops below 1e-10 N; the softest stiffness, EI/L³ of the net, is 0.01 N/mm.
         np.testing.assert_allclose(other["displacements"], one["displacements"], atol=1e-8)
         np.testing.assert_allclose(other["gamma"], one["gamma"], atol=1e-9)
+        # Two cells: on three ranks one has nothing.
+        np.testing.assert_allclose(other["cross"], one["cross"], atol=1e-8)
+    assert np.abs(one["cross"]).max() > 0.1
     assert np.abs(one["displacements"]).max() > 1.0

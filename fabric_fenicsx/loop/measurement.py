@@ -213,6 +213,7 @@ def read_measurement(folder: Path) -> Measurement:
         what = "is a file" if folder.exists() else "no such folder"
         raise InputError(f"{folder}: {what}, allowed is a folder with a {FILE}")
     path = folder / FILE
+    _refuse_devices(path)
     data = read_yaml(path, "a measurement")
     if not isinstance(data, dict):
         raise InputError(f"{path}: {plain(data)}, allowed is a mapping of keys")
@@ -229,6 +230,12 @@ def read_measurement(folder: Path) -> Measurement:
     runs = tuple(_read_run(folder, keys, entry) for entry in keys.runs)
     noise = getattr(keys.noise, QUANTITY[keys.test])
     return Measurement(folder, keys.test, keys.title, keys.fabric, keys.rig, noise, runs)
+
+
+def _refuse_devices(path: Path) -> None:
+    """A pipe or a device may never end."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(f"{path}: is a pipe or a device, allowed is a file")
 
 
 def _check_choice(path: Path, data: dict[Any, Any], key: str, allowed: tuple[str, ...]) -> None:
@@ -252,6 +259,8 @@ def _check_noise(path: Path, keys: MeasurementKeys) -> None:
 def _check_runs(path: Path, keys: MeasurementKeys) -> None:
     files = [entry.file for entry in keys.runs]
     for i, name in enumerate(files):
+        if not name.isprintable():
+            raise InputError(f"{path}: runs.{i}.file: {plain(name)}, allowed is the name of a CSV")
         if name in files[:i]:
             raise InputError(f"{path}: runs.{i}.file: {name!r} stands twice, allowed is once")
     if all(entry.role == "holdout" for entry in keys.runs):
@@ -313,8 +322,9 @@ def _read_run(folder: Path, keys: Any, entry: RunKeys) -> Run:
 
 def _read_table(path: Path) -> pd.DataFrame:
     try:
+        _refuse_devices(path)
         if path.is_dir():
-            raise InputError(f"{path}: is a folder, allowed is a CSV file")
+            raise InputError(f"{path}: is a folder, allowed is a CSV that `runs` names")
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file, allowed is a CSV that `runs` names") from None

@@ -30,7 +30,20 @@ __all__ = ["BLOCK", "Discretisation"]
 #: Unknowns per node: three displacements, three rotations.
 BLOCK = 6
 
+#: PETSc's own copy of each communicator that nets are on, by its handle.
+_COPIES: dict[int, PETSc.Comm] = {}
+
 Array = npt.NDArray[np.float64]
+
+
+def _keep_copy(comm: MPI.Comm) -> None:
+    """Make PETSc keep its copy of a communicator until the process ends; collective.
+
+    It would drop the copy with the last object on it, and Python drops objects at other moments on
+    other ranks: at the next net one rank would then make a new copy and wait for the others.
+    """
+    if comm.py2f() not in _COPIES:
+        _COPIES[comm.py2f()] = PETSc.Comm(comm).duplicate()
 
 
 class Discretisation:
@@ -60,6 +73,7 @@ class Discretisation:
         comm: MPI.Comm,
         interlacing: Array | None = None,
     ) -> None:
+        _keep_copy(comm)
         self.net, self.comm = net, comm
         self.interlacing = np.ones(len(net.crossings)) if interlacing is None else interlacing
         mesh = _dolfinx.interval_mesh(comm, net.points, net.cells)

@@ -17,6 +17,7 @@ from petsc4py import PETSc
 import numpy as np
 import numpy.typing as npt
 
+from .._dolfinx import NOT_A_NUMBER
 from ..errors import SolveError
 from .pressed import Dyad, DyadicLU
 from .system import System
@@ -194,7 +195,7 @@ class Newton:
         reasons = PETSc.SNES.ConvergedReason
         if reason > 0:
             return "converged"
-        if reason == reasons.DIVERGED_FNORM_NAN:
+        if reason == NOT_A_NUMBER:
             return self._refused or "the residual is not a number"
         if reason == reasons.DIVERGED_LINEAR_SOLVE:
             return "the tangent could not be factorised"
@@ -265,7 +266,7 @@ class Newton:
         self._history.append(residual)
         self._step = norms[1] if iteration else float("inf")
         if not np.isfinite(residual):
-            return int(reasons.DIVERGED_FNORM_NAN)
+            return NOT_A_NUMBER
         if iteration > 0 and residual < self.force_tolerance:
             return int(reasons.CONVERGED_FNORM_ABS)
         history = self._history
