@@ -1,14 +1,18 @@
-"""Whatever stands in a case file, the command line says one line or does as asked; no traceback."""
+"""Whatever stands in an input file, the command line says one line or does as asked."""
 
 import resource
+import shutil
 import signal
 from collections import Counter
 from contextlib import contextmanager
 
 import pytest
 from fuzz import mutant
+from fuzz_measurements import broken
 
 from fabric_fenicsx.__main__ import main
+from fabric_fenicsx.errors import InputError
+from fabric_fenicsx.loop.measurement import read_measurement
 
 MEMORY = 6 << 30
 """Bytes of address space that a broken number must not reach."""
@@ -33,16 +37,16 @@ ODD = {
 
 
 @contextmanager
-def watched():
-    """Limits of memory and time, as a user's patience has them."""
+def watched(patience=PATIENCE, error=TimeoutError):
+    """Limits of memory and time [s], as a user's patience has them; the error of a late one."""
 
     def late(number, frame):
-        raise TimeoutError(f"not done in {PATIENCE} s")
+        raise error(f"not done in {patience} s")
 
     before = resource.getrlimit(resource.RLIMIT_AS)
     handler = signal.signal(signal.SIGALRM, late)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, before[1]))
-    signal.alarm(PATIENCE)
+    signal.alarm(patience)
     try:
         yield
     finally:
@@ -95,3 +99,57 @@ def test_case_files_broken_at_random(tmp_path, capsys):
 @pytest.mark.slow
 def test_many_case_files_broken_at_random(tmp_path, capsys):
     tried(range(1000, 5000), tmp_path / "case.yaml", capsys)
+
+
+#: One effect of each test is enough to come by all that a search does; a drape has its own.
+TRIED = {"picture_frame": ["crossover_friction"], "cantilever": ["clamp_tilt"], "drape": []}
+
+
+def test_measurements_broken_at_random(tmp_path, capsys):
+    """What is refused is refused by the command, in one line and before it writes anything."""
+    codes = Counter()
+    for seed in range(80):
+        folder = tmp_path / str(seed)
+        broken(seed, folder)
+        with watched():
+            try:
+                read_measurement(folder)
+            except InputError as error:
+                codes["refused"] += 1
+                line = " ".join(str(error).split())
+            else:
+                codes["taken"] += 1
+                continue
+            with pytest.raises(SystemExit) as ended:
+                main(["diagnose", str(folder), "--out", str(tmp_path / "out"), "--quiet"])
+        said = capsys.readouterr()
+        assert (ended.value.code, said.err, said.out) == (2, line + "\n", ""), seed
+        assert not (tmp_path / "out").exists(), seed
+    assert min(codes.values()) > 0.1 * codes.total()  # both sides are tried
+
+
+@pytest.mark.slow
+def test_measurements_broken_at_random_are_diagnosed(tmp_path, capsys):
+    """What is taken ends with a whole report, a line, or on request; never with half a report."""
+    codes = Counter()
+    for seed in range(10000, 10150):
+        folder, out = tmp_path / str(seed), tmp_path / f"out {seed}"
+        broken(seed, folder)
+        try:
+            effects = TRIED[read_measurement(folder).test]
+        except InputError:
+            continue
+        chosen = ["--effects", *effects] if effects else []
+        with watched(60, KeyboardInterrupt), pytest.raises(SystemExit) as ended:
+            main(["diagnose", str(folder), "--out", str(out), "--quiet", *chosen])
+        said, code = capsys.readouterr(), ended.value.code or 0
+        codes[code] += 1
+        assert code in (0, 2, 3, 130), (seed, said.err)
+        assert len(said.err.splitlines()) == (code != 0), (seed, said.err)
+        left = {path.name for path in out.rglob("*")}
+        assert ({"report.json", "report.html"} <= left) == bool(left) == (code == 0), (seed, left)
+        assert not any("partial" in name for name in left), (seed, left)
+        shutil.rmtree(out, ignore_errors=True)
+    with capsys.disabled():
+        print(f"\ndiagnosed: {dict(codes)} by exit code")
+    assert codes[0] > 5

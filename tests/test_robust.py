@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 import pytest
+from measurements.bad import good
 from test_cli import MPI, TINY, command, own_lines
 
 from fabric_fenicsx.__main__ import main
@@ -139,6 +140,49 @@ def test_a_full_disk_stops_with_one_line(case, small_disk, ranks):
             assert {"u", "time"} <= set(whole.files)
 
 
+@pytest.fixture
+def read_only(tmp_path):
+    """A place that can be filled and then only be read, where that can be mounted."""
+    disk = tmp_path / "read only"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "tmpfs", disk]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("no disk can be mounted here")
+
+    def lock():
+        subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
+        return disk
+
+    disk.joinpath("measured").mkdir()
+    yield disk, lock
+    subprocess.run(["umount", disk], check=True)
+
+
+def test_input_that_can_only_be_read(read_only, tmp_path, monkeypatch, capsys):
+    """It is read from there; what would be written there is told in one line."""
+    disk, lock = read_only
+    (disk / "case.yaml").write_text(SHORT)
+    good("picture_frame", disk / "measured")
+    lock()
+
+    def main_code(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main([str(argument) for argument in arguments])
+        return ended.value.code or 0, capsys.readouterr().err
+
+    out = tmp_path / "out"
+    quiet = ("--no-pictures", "--quiet")
+    assert main_code("run", disk / "case.yaml", "--out", out, *quiet) == (0, "")
+    monkeypatch.chdir(disk)
+    reason = "the output folder cannot be written (Read-only file system)"
+    for arguments, folder in (
+        (("run", "case.yaml", *quiet), "results/case"),
+        (("diagnose", "measured", "--quiet"), "results/diagnosis_measured"),
+        (("diagnose", "measured", "--quiet", "--out", "measured"), "measured"),
+    ):
+        assert main_code(*arguments) == (2, f"{folder}: {reason}\n")
+
+
 def test_names_that_are_not_ascii(tmp_path):
     folder = tmp_path / "Gewebe ü 织物"
     folder.mkdir()
@@ -161,6 +205,25 @@ def test_more_ranks_than_tows(tmp_path):
     three = command("run", path, "--out", tmp_path / "three", "--no-pictures", ranks=3)
     assert (one.returncode, three.returncode) == (0, 0), one.stderr + three.stderr
     assert (tmp_path / "one/shape.csv").read_text() == (tmp_path / "three/shape.csv").read_text()
+
+
+def test_input_of_another_version(tmp_path, capsys):
+    """Of measurements by their schema, before all keys that may differ; of cases by their keys."""
+    good("cantilever", tmp_path)
+    path, case = tmp_path / "measurement.yaml", tmp_path / "case.yaml"
+    older = path.read_text().replace("fabric-measurement/1", "fabric-measurement/0")
+    path.write_text(older.replace("width_mm", "breadth_mm"))
+    case.write_text(SHORT + "schema: fabric-case/0\n")
+    for command, told in (
+        (["diagnose", str(tmp_path)], f"{path}: schema: 'fabric-measurement/0', did you mean "),
+        (["run", str(case)], f"{case}: schema: unknown key, allowed are "),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main([*command, "--out", str(tmp_path / "out")])
+        said = capsys.readouterr().err
+        assert ended.value.code == 2 and len(said.splitlines()) == 1
+        assert said.startswith(told), said
+    assert not (tmp_path / "out").exists()
 
 
 def changed(path, **arrays):

@@ -289,6 +289,17 @@ def test_bad_input_is_one_line(folder, capsys, monkeypatch, name):
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
 
 
+def test_a_screen_that_does_not_answer_is_one_line(folder, capfd, monkeypatch):
+    """VTK would draw into a window that nobody sees and end well."""
+    monkeypatch.setenv("DISPLAY", ":987")
+    assert command("view", folder, "--window") == 2
+    printed = capfd.readouterr()
+    assert printed.err == (
+        "a window: the screen that DISPLAY names cannot be reached, allowed is a saved picture\n"
+    )
+    assert printed.out == ""
+
+
 @pytest.mark.parametrize("part", ["net.npz", "paraview/tows_00004.vtu", "paraview/tows.pvd"])
 @pytest.mark.parametrize("cut", [0.0, 0.6])
 def test_a_file_cut_short_is_one_line(folder, tmp_path, capfd, part, cut):

@@ -149,6 +149,9 @@ MAY_BE_EMPTY = {"cantilever": ("s_mm",)}
 FEWEST = {"picture_frame": 4, "cantilever": 3, "drape": 1}
 """Readings without which a file says nothing."""
 
+LARGEST = 1e12
+"""Of a reading in N, mm, s or degrees: sums of squares of such are still numbers."""
+
 
 @dataclass(frozen=True, slots=True)
 class Run:
@@ -356,10 +359,12 @@ def _numbers(path: Path, name: str, cells: pd.Series[str], may_be_empty: bool) -
             values[i] = float(cell)
         except ValueError:
             values[i] = math.nan
-        if not math.isfinite(values[i]) or "_" in cell:
+        if not abs(values[i]) <= LARGEST or "_" in cell:
             shown = plain(cell) if cell else "an empty cell"
             raise InputError(
-                one_line(f"{path}: {name}: {shown} in reading {i + 1}, allowed is a finite number")
+                one_line(
+                    f"{path}: {name}: {shown} in reading {i + 1}, allowed is a number up to 1e12"
+                )
             )
     return values
 

@@ -10,9 +10,13 @@ from typing import Any
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from fabric_fenicsx.output.files import replacing
+from ..errors import InputError
+from .files import replacing
 
 __all__ = ["canvas", "headline"]
+
+UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
+"""What VTK draws in where it reaches no screen."""
 
 Light = tuple[tuple[float, float, float], float]
 """Place of a light as the camera sees it (to the right, up, towards the eye) and its strength."""
@@ -29,12 +33,20 @@ def canvas(
             instead.
         size: width and height [pixels].
         lights: what lights the scene.
+
+    Raises:
+        InputError: a window is wanted and no screen can be reached.
     """
     with _quiet():
         plotter: Any = pv.Plotter(
             off_screen=path is not None, window_size=list(size), lighting="none"
         )
         try:
+            if path is None and plotter.render_window.GetClassName() in UNSEEN:
+                raise InputError(
+                    "a window: the screen that DISPLAY names cannot be reached, "
+                    "allowed is a saved picture"
+                )
             plotter.set_background("white")
             for place, intensity in lights:
                 light = pv.Light(position=place, light_type="camera light", intensity=intensity)
