@@ -214,12 +214,12 @@ def test_input_of_another_version(tmp_path, capsys):
     older = path.read_text().replace("fabric-measurement/1", "fabric-measurement/0")
     path.write_text(older.replace("width_mm", "breadth_mm"))
     case.write_text(SHORT + "schema: fabric-case/0\n")
-    for command, told in (
+    for arguments, told in (
         (["diagnose", str(tmp_path)], f"{path}: schema: 'fabric-measurement/0', did you mean "),
         (["run", str(case)], f"{case}: schema: unknown key, allowed are "),
     ):
         with pytest.raises(SystemExit) as ended:
-            main([*command, "--out", str(tmp_path / "out")])
+            main([*arguments, "--out", str(tmp_path / "out")])
         said = capsys.readouterr().err
         assert ended.value.code == 2 and len(said.splitlines()) == 1
         assert said.startswith(told), said
