@@ -74,8 +74,8 @@ def command(*arguments, ranks=1, code=None, timeout=300):
 
 
 def own_lines(stderr):
-    """What was said on stderr, without what mpirun adds about a process that ended badly."""
-    return stderr.split("-" * 74)[0].strip().splitlines()
+    """What was said on stderr, without what mpirun adds between two rules of its own."""
+    return "".join(stderr.split("-" * 74)[::2]).strip().splitlines()
 
 
 def contents(folder):
