@@ -225,7 +225,7 @@ def test_a_model_without_parameters_has_nothing_to_fit(tmp_path):
     model = fit(drape, (), {}, drape.readings.fit)
     assert model.values == model.std == {}
     assert model.freedom == len(x)
-    assert model.spread.shape[1] == 0
+    assert model.slopes.shape[1] == 0
 
 
 def test_readings_are_weighed_by_their_sigma_and_the_models_own_scatter(tmp_path):

@@ -24,9 +24,9 @@ from scipy.interpolate import CubicSpline
 from ..errors import SolveError
 from .cantilever_effects import CANTILEVER_EFFECTS
 from .effects import Effect, Parameter, StripVariant, Variant, scaled
-from .experiment import Readings
+from .experiment import Law, Readings
 from .hanging import HangingTow, Laws
-from .marching import Marched
+from .marching import Marched, Varying
 from .measurement import Measurement
 
 __all__ = ["Cantilever"]
@@ -45,6 +45,8 @@ SMOOTH = 5
 FEWEST = 12
 #: Sigmas from which a reading is not taken for scatter.
 SPIKE = 4.0
+#: Points of a law that is shown.
+LAW_POINTS = 201
 #: Points on a predicted line among which the nearest to a reading is looked for.
 FINE = 400
 
@@ -83,6 +85,7 @@ class Cantilever:
 
     test = "cantilever"
     quantity = "z_mm"
+    notes = ()
 
     def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
         given = [m.noise for m in measurements if m.noise is not None]
@@ -237,6 +240,26 @@ class Cantilever:
             for name, change in changes.items():
                 slopes[name][own.rows] = change
         return expected, slopes
+
+    def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law:
+        """Moment per width of the curvature beyond that unloaded, up to the largest one reached.
+
+        Raises:
+            SolveError: the model has no solution there.
+        """
+        mine = [v for v in variants if isinstance(v, StripVariant)]
+        laws = self._laws(mine)
+        shapes = [own.tow.solve(values, laws, slopes=False) for own in self._specimens]
+        kappa = np.linspace(0.0, max(float(np.abs(s.curvature).max()) for s in shapes), LAW_POINTS)
+        per_C1 = self.stiffness_per_C1
+        moment, slopes = values["C1_MPa"] * per_C1 * kappa, {"C1_MPa": per_C1 * kappa}
+        for own in laws.moments:
+            added = own({"kappa": Varying(kappa)}, {**values, "B": values["C1_MPa"] * per_C1})
+            moment = moment + added["moment"].value
+            for name, slope in added["moment"].slopes.items():
+                name, scale = ("C1_MPa", per_C1) if name == "B" else (name, 1.0)
+                slopes[name] = slopes.get(name, 0.0) + scale * slope
+        return Law("curvature_1_mm", "moment_N", kappa, moment, slopes)
 
     def _heights(
         self, own: _Specimen, x: Array, z: Array, slopes: Mapping[str, Array]

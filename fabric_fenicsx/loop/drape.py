@@ -247,6 +247,9 @@ class Drape:
 
     # Model --------------------------------------------------------------------------------
 
+    def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
+        """None: angles on a sheet are on no curve; see Experiment."""
+
     def predict(
         self, variants: Sequence[Variant], values: Mapping[str, float]
     ) -> tuple[Array, dict[str, Array]]:

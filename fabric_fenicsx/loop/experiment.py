@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from .effects import Effect, Parameter, Variant
 
-__all__ = ["Experiment", "Readings"]
+__all__ = ["Experiment", "Law", "Readings"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -48,6 +48,24 @@ class Readings:
         return ~self.holdout & self.usable
 
 
+@dataclass(frozen=True, slots=True)
+class Law:
+    """A material law as it was fitted, over the range that the test reached.
+
+    Attributes:
+        x, y: names of the axes with their units, as columns of a file.
+        at: (n,).
+        value: (n,).
+        slopes: of the value in the parameters, (n,) each.
+    """
+
+    x: str
+    y: str
+    at: Array
+    value: Array
+    slopes: Mapping[str, Array]
+
+
 class Experiment(Protocol):
     """A test with a baseline model and effects that can be added to it."""
 
@@ -79,6 +97,15 @@ class Experiment(Protocol):
     @property
     def effects(self) -> Sequence[Effect]:
         """The candidates, their starts and bounds fitted to the data."""
+        ...
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What a reader of the report has to know of the model."""
+        ...
+
+    def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law | None:
+        """The material law of a model, where the test has one that a curve shows."""
         ...
 
     def predict(

@@ -13,8 +13,16 @@ from matplotlib.figure import Figure
 
 from .diagnosis import Diagnosis
 from .fitting import Fit
+from .laws import law_table
 
-__all__ = ["candidates_figure", "data_figure", "quantity_label", "residual_figure", "shown_model"]
+__all__ = [
+    "candidates_figure",
+    "data_figure",
+    "law_figure",
+    "quantity_label",
+    "residual_figure",
+    "shown_model",
+]
 
 Flags = npt.NDArray[np.bool_]
 
@@ -23,6 +31,7 @@ INK = "#27313b"
 WIDTH = 10.0  # of a figure [inch]
 MANY = 4000  # readings above which their markers are drawn as pixels
 
+LAW_AXES = {"curvature_1_mm": "curvature [1/mm]", "moment_N": "moment per width [N]"}
 QUANTITIES = {"force_N": "force [N]", "z_mm": "height z [mm]", "angle_deg": "angle [°]"}
 
 
@@ -197,6 +206,28 @@ def candidates_figure(diagnosis: Diagnosis) -> Figure | None:
     _plain_ticks(axes)
     axes.set_xlabel(f"root mean square of {quantity_label(diagnosis.experiment.quantity)}")
     axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def law_figure(diagnosis: Diagnosis) -> Figure | None:
+    """The material law, with twice its standard error, and the baseline's; None: there is none."""
+    table = law_table(diagnosis)
+    if table is None:
+        return None
+    x, y = table.columns[:2]
+    figure = _figure(3.2)
+    axes = figure.subplots()
+    axes.plot(
+        table[x], table[f"baseline_{y}"], color=BEFORE, linestyle=(0, (4, 2)), label="baseline"
+    )
+    model = shown_model(diagnosis)
+    if model is not None:
+        doubt = 2.0 * table[f"std_{y}"]
+        axes.fill_between(table[x], table[y] - doubt, table[y] + doubt, color=FAINT)
+        axes.plot(table[x], table[y], color=AFTER, label=model[1])
+    axes.set_xlabel(LAW_AXES[x])
+    axes.set_ylabel(LAW_AXES[y])
+    _legend(figure, np.array([[axes]]))
     return figure
 
 

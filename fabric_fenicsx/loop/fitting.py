@@ -41,8 +41,9 @@ class Fit:
         expected: the model there, (n,).
         used: readings that were fitted, (n,).
         weight: of the readings, (n,).
-        spread: weighted change of the expected readings with one standard error, for a noise of
-            one unit, of independent combinations of the parameters, (n, n_values).
+        slopes: weighted derivatives of the expected readings in the parameters, (n, n_values).
+        root: of the parameters' covariance for a noise of one unit, (n_values, n_values): their
+            change with one standard error of independent combinations of them.
     """
 
     variants: tuple[Variant, ...]
@@ -54,7 +55,8 @@ class Fit:
     expected: Array
     used: npt.NDArray[np.bool_]
     weight: Array
-    spread: Array
+    slopes: Array
+    root: Array
 
     @property
     def sum_of_squares(self) -> float:
@@ -75,20 +77,30 @@ class Fit:
         """Root mean square of the weighted residual there, in units that prediction allows for.
 
         A prediction is as uncertain as the parameters it is made with, and its errors go together:
-        with G the spread there, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum of squares, by
-        Woodbury's identity. NaN if there are none.
+        with G Gᵀ the covariance of what is expected, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum
+        of squares, by Woodbury's identity. NaN if there are none.
         """
-        r, G = (self.residual * self.weight)[rows], self.spread[rows]
+        r, G = (self.residual * self.weight)[rows], self.slopes[rows] @ self.root
         if len(r) == 0:
             return float("nan")
         Gr = G.T @ r
         left = float(r @ r - Gr @ np.linalg.solve(np.eye(G.shape[1]) + G.T @ G, Gr))
         return float(np.sqrt(max(left, 0.0) / len(r)))
 
+    def error_of(self, slopes: Mapping[str, Array], noise: float) -> Array:
+        """Standard error of a function of the parameters from its slopes in them, (n,) each."""
+        count = len(next(iter(slopes.values())))
+        columns = [np.broadcast_to(slopes.get(name, 0.0), count) for name in self.values]
+        J = np.column_stack(columns)
+        return np.asarray(np.linalg.norm(J @ self.root, axis=1) * self._scatter(noise))
+
     def errors_at(self, noise: float) -> dict[str, float]:
         """Standard errors for a noise, or for the scatter about the fit where that is larger."""
-        scatter = np.sqrt(self.sum_of_squares / self.freedom)
-        return {name: std * max(noise, float(scatter)) for name, std in self.std.items()}
+        scatter = self._scatter(noise)
+        return {name: std * scatter for name, std in self.std.items()}
+
+    def _scatter(self, noise: float) -> float:
+        return max(noise, float(np.sqrt(self.sum_of_squares / self.freedom)))
 
 
 def parameters_of(experiment: Experiment, variants: Sequence[Variant]) -> list[Parameter]:
@@ -179,7 +191,8 @@ def fit(
         expected=expected,
         used=used,
         weight=readings.weight,
-        spread=every @ root,
+        slopes=every,
+        root=root,
     )
 
 
@@ -199,7 +212,8 @@ def _without_parameters(
         expected=expected,
         used=used,
         weight=readings.weight,
-        spread=np.zeros((len(expected), 0)),
+        slopes=np.zeros((len(expected), 0)),
+        root=np.zeros((0, 0)),
     )
 
 

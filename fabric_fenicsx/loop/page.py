@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 
 from .. import __version__
 from .diagnosis import Diagnosis
-from .figures import candidates_figure, data_figure, residual_figure, shown_model
+from .figures import candidates_figure, data_figure, law_figure, residual_figure, shown_model
+from .laws import law_table
 from .report import parameter_unit
 
 __all__ = ["write_page"]
@@ -27,7 +28,7 @@ DOTS = 160  # per inch, of the figures that are files
 
 
 def write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]]]) -> None:
-    """Write report.html and its figures as PNG files beside it.
+    """Write report.html, its figures as PNG files beside it and the fitted law as CSV.
 
     Args:
         folder: is there.
@@ -44,6 +45,9 @@ def write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]]
             figure.draw_without_rendering()
             figure.set_layout_engine("none")
             figure.savefig(folder / f"{report['test']}_{name}.png", dpi=DOTS)
+        law = law_table(diagnosis)
+        if law is not None:
+            law.to_csv(folder / f"{report['test']}_law.csv", index=False)
         sections.append(
             {
                 "report": report,
@@ -98,6 +102,9 @@ def _figures(diagnosis: Diagnosis, report: Mapping[str, Any]) -> dict[str, tuple
             "without a pattern inside the band.",
         ),
     }
+    law = law_figure(diagnosis)
+    if law is not None:
+        made["law"] = (law, f"The fitted law{with_model}; the band is twice its standard error.")
     candidates = candidates_figure(diagnosis)
     if candidates is not None:
         made["candidates"] = (candidates, "Errors with each effect added to the baseline alone.")

@@ -53,6 +53,7 @@ class PictureFrame:
     test = "picture_frame"
     quantity = "force_N"
     baseline = BASELINE
+    notes = ()
 
     def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
         self.noise = _common_noise(measurements)
@@ -140,6 +141,9 @@ class PictureFrame:
 
     def _at_readings(self, values: Array) -> Array:
         return np.broadcast_to(values, self._points["D"].value.shape)[self._place]
+
+    def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
+        """None: the moment depends on the angle, its rate and its past; see Experiment."""
 
     def predict(
         self, variants: Sequence[Variant], values: Mapping[str, float]

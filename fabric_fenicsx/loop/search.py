@@ -170,7 +170,7 @@ class _Search:
             white_before=self._whiteness(baseline),
             white_after=self._whiteness(chosen),
             outliers=self.outliers,
-            notes=list(getattr(self.experiment, "notes", ())),
+            notes=list(self.experiment.notes),
         )
 
     def _tried(self) -> tuple[list[Candidate], list[Candidate]]:
@@ -231,7 +231,10 @@ class _Search:
         if not explained:
             return (pair, both_explain) if gain > DECISIVE else (single, False)
         better = self._cross_validated(pair[0]) < 0.97 * self._cross_validated(single[0])
-        return (pair, True) if gain > DECISIVE and better and both_explain else (single, True)
+        # As good a fit will do where it alone predicts what was held out.
+        alone = self._foresees(pair[0]) and not self._foresees(single[0])
+        enough = gain > (-LEAST if alone else DECISIVE)
+        return (pair, True) if enough and better and both_explain else (single, True)
 
     def _first_that_explains(self, models: list[Model]) -> tuple[Model, bool]:
         """Of those that fit all but equally well, the best in cross-validation that explains."""
@@ -261,7 +264,10 @@ class _Search:
         # The form of the first was chosen without the second: now with it.
         found.sort(key=lambda pair: self._criterion(pair[0]))
         for k, (both, effects) in enumerate(found[:FIRST]):
-            rest = without(self.experiment, both, effects[0].variants)
+            try:
+                rest = without(self.experiment, both, effects[0].variants)
+            except SolveError:
+                continue
             again = self._best_variant(rest, effects[0])
             if again is not None and self._criterion(again) < self._criterion(both):
                 found[k] = (again, effects)

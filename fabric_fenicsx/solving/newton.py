@@ -162,6 +162,10 @@ class Newton:
         reason = snes.getConvergedReason()
         if reason > 0:
             self.system.set_increment(self.x)
+        elif reason == PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE:
+            # PETSc clears a factor's error after a zero pivot only; after any other one this solver
+            # would fail for good.
+            self._solvers.pop(self._symmetric).destroy()
         return Outcome(
             converged=reason > 0,
             reason=self._words(reason),
