@@ -165,6 +165,11 @@ def residual_figure(diagnosis: Diagnosis) -> Figure:
                     label=kind,
                     rasterized=len(along) > MANY,
                 )
+            axes.ticklabel_format(axis="x", useOffset=False)
+            middle = float(np.mean(along))
+            # What hardly changes has no range of its own.
+            if np.ptp(along) < 1e-3 * abs(middle):
+                axes.set_xlim(sorted((0.9 * middle, 1.1 * middle)))
             if row == len(models) - 1:
                 axes.set_xlabel(label)
         panels[row, 0].set_title(name, loc="left", fontsize=9)

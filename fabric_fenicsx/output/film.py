@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import replacing
 from fabric_fenicsx.output.lines import COLOURS, scale_limits, tow_lines
-from fabric_fenicsx.output.pictures import draw_net
+from fabric_fenicsx.output.pictures import colour_map, draw_net
 from fabric_fenicsx.output.snapshot import Snapshot
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
 
@@ -23,6 +24,9 @@ __all__ = ["encoder", "write_film"]
 
 HELD = 8
 """Times that the last picture is shown."""
+
+SHADES = 128
+"""Of the colour scale that a GIF's palette of 255 is made for."""
 
 
 def encoder(path: Path) -> str | None:
@@ -106,17 +110,23 @@ def write_film(
             progress(number + 1)
         with replacing(path) as partial:
             if program is None:
-                _gif(partial, pictures, rate)
+                _gif(partial, pictures, rate, colour_map(quantity, limits))
             else:
                 _mp4(program, partial, Path(folder), len(pictures), rate)
 
 
-def _gif(path: Path, pictures: list[Path], rate: float) -> None:
+def _gif(path: Path, pictures: list[Path], rate: float, colours: Any) -> None:
     from PIL import Image
 
     images = [Image.open(picture).convert("RGB") for picture in pictures]
-    # One palette for all, or the colours flicker; the last picture has the most of them.
-    palette = images[-1].quantize(255)
+    # One palette for all, or the colours flicker. The last picture has the most of them, and the
+    # whole scale beside it, or the few pixels of the scale would get too few to look continuous.
+    width, height = images[-1].size
+    scale = Image.fromarray(np.uint8(255 * colours(np.linspace(0.0, 1.0, SHADES))[None, :, :3]))
+    both = Image.new("RGB", (width, 2 * height))
+    both.paste(images[-1])
+    both.paste(scale.resize((width, height), Image.Resampling.NEAREST), (0, height))
+    palette = both.quantize(255)
     images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     durations = [round(1000.0 / rate)] * len(images)
     durations[-1] *= HELD

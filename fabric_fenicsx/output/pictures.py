@@ -19,6 +19,7 @@ from fabric_fenicsx.output.canvas import canvas, headline
 from fabric_fenicsx.output.lines import (
     COLOURS,
     Line,
+    Quantity,
     arc_length,
     round_step,
     scale_limits,
@@ -108,7 +109,6 @@ def draw_net(
     if not limits[0] < limits[1]:
         raise ValueError(f"picture: limits are {limits}, not a lower and a higher value")
     step = round_step(limits[1] - limits[0])
-    diverging = quantity.signed and limits[0] < 0.0 < limits[1]
     tubes = _tubes(lines, radius if radius is not None else 0.12 * tow_spacing(net))
     tools = [(triangulated(surface), surface) for surface in surfaces]
 
@@ -131,7 +131,7 @@ def draw_net(
         plotter.add_mesh(
             tubes,
             scalars="values",
-            cmap="coolwarm" if diverging else SEQUENTIAL,
+            cmap=colour_map(quantity, limits),
             clim=limits,
             nan_color="#8a8a8a",
             smooth_shading=True,
@@ -148,6 +148,12 @@ def draw_net(
         clouds = (np.asarray(mesh.points) for mesh in (tubes, *(mesh for mesh, _ in tools)))
         shown = list(clouds) if frame is None else [frame]
         _aim(plotter, view, shown, size)
+
+
+def colour_map(quantity: Quantity, limits: tuple[float, float]) -> Any:
+    """The colours of a scale, a matplotlib colormap: diverging where both signs matter."""
+    diverging = quantity.signed and limits[0] < 0.0 < limits[1]
+    return colormaps["coolwarm"] if diverging else SEQUENTIAL
 
 
 def _tubes(lines: list[Line], radius: float) -> pv.PolyData:
