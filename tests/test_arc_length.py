@@ -29,10 +29,10 @@ def truss(load, **options):
     return model, path
 
 
-def test_two_bar_truss_snaps_through():
-    """P(w) = EA (l/L − 1)(w − h)/l with l² = a² + (h − w)²: both limit points and the way down.
+def truss_path():
+    """Deflections [mm] of the apex through both limit points, with the load's found and exact [N].
 
-    A straight bar with free ends: any model of it has this path, to the solver's tolerance.
+    P(w) = EA (l/L − 1)(w − h)/l with l² = a² + (h − w)².
     """
     a, h, EA = 100.0, 10.0, 5e4
     model, path = truss(lambda m, f: set_loads(m, 1, [0, 0, -f, 0, 0, 0]), length=0.7, largest=1.0)
@@ -42,9 +42,19 @@ def test_two_bar_truss_snaps_through():
         w.append(-displacement(model)[1, 2])
     w, P = np.array(w), np.array(P)
     L, current = np.hypot(a, h), np.hypot(a, h - w)
-    assert pytest.approx(EA * (current / L - 1.0) * (w - h) / current, abs=1e-6) == P
+    return w, P, EA * (current / L - 1.0) * (w - h) / current
+
+
+def test_two_bar_truss_snaps_through():
+    """Both limit points and the way down.
+
+    A straight bar with free ends: any model of it has this path, to the solver's tolerance.
+    """
+    w, P, exact = truss_path()
+    assert pytest.approx(exact, abs=1e-6) == P
     assert (np.diff(w) > 0.0).all()
-    assert P.min() < -0.19 * EA * (h / L) ** 3 and P.max() > 0.19 * EA * (h / L) ** 3
+    # EA (h/L)³ is 49.26 N.
+    assert P.min() < -0.19 * 49.26 and P.max() > 0.19 * 49.26
     assert np.abs(np.diff(w)).max() <= 1.0 + 1e-8
 
 
@@ -108,13 +118,11 @@ def test_clamped_hinged_arch():
     assert (4.0 * fine - coarse) / 3.0 == pytest.approx(8.97, abs=0.005)
 
 
-@pytest.mark.mpi
-def test_a_tow_buckles_in_the_plane_of_the_sheet():
-    """Euler's load and the elastica beyond it: P/P_c = (2 K(sin α/2)/π)² with α at the free end.
+def buckled():
+    """Angles α [rad] at a buckled tow's free end, its load over Euler's, and the elastica's.
 
-    A clamped tow whose section is 50 times stiffer out of the plane; a side load of 1e-4 P_c starts
-    it. The path turns sharply at P_c, where load control would need luck. Shear and stretch make up
-    EI/(L² κGA) = 2e-6.
+    P/P_c = (2 K(sin α/2)/π)². A clamped tow whose section is 50 times stiffer out of the plane; a
+    side load of 1e-4 P_c starts it. Displacements out of the plane [mm] come last.
     """
     L, cells, EI = 100.0, 40, 1e3
     x = np.linspace(0.0, L, cells + 1)
@@ -137,7 +145,18 @@ def test_a_tow_buckles_in_the_plane_of_the_sheet():
         found.append((2.0 * np.arctan2(end[3], end[0]) + 1e-4, factor))
     alpha, P = np.array(found).T
     exact = (2.0 * ellipk(np.sin(alpha / 2.0) ** 2) / np.pi) ** 2
+    return alpha, P, exact, displacement(model)[:, 2]
+
+
+@pytest.mark.mpi
+def test_a_tow_buckles_in_the_plane_of_the_sheet():
+    """Euler's load and the elastica beyond it.
+
+    The path turns sharply at P_c, where load control would need luck. Shear and stretch make up
+    EI/(L² κGA) = 2e-6.
+    """
+    alpha, P, exact, out_of_plane = buckled()
     far = alpha > np.radians(15.0)
     assert far.sum() >= 6
     assert P[far] == pytest.approx(exact[far], rel=1e-3)
-    assert np.abs(displacement(model)[:, 2]).max() < 1e-9
+    assert np.abs(out_of_plane).max() < 1e-9

@@ -55,34 +55,47 @@ def squeezed(force, *, mu, pull=0.0, cells=8, far=1e4):
     )
 
 
-@pytest.mark.mpi
-@pytest.mark.parametrize("force", [0.4, 30.0])
-def test_height_between_flat_plates(force):
-    """Each face sinks by d with ψ′(d) = F/L: in the layer d = √(2δp/k), beyond it d = p/k + δ/2."""
+def height(force):
+    """The holder's place z [mm] on a tow between flat plates, its force [N], and the exact place.
+
+    Each face sinks by d with ψ′(d) = F/L: in the layer d = √(2δp/k), beyond it d = p/k + δ/2.
+    """
     model = squeezed(force, mu=0.0)
     Statics(model, force_tolerance=1e-10).run(1)
     p, k, layer = force / LENGTH, 0.5, 0.5
     d = np.sqrt(2.0 * layer * p / k) if p < k * layer / 2.0 else p / k + layer / 2.0
     assert (d > layer) == (force > 10.0)
-    # The distance functions round their roots by 1e-4 mm, which moves a face by 5e-9 mm.
-    assert model.tool_place("holder")[2] == pytest.approx(0.1 - 2.0 * d, abs=3e-8)
-    assert model.tool_forces()["holder"][2] == pytest.approx(-force, rel=1e-9)
+    return model.tool_place("holder")[2], model.tool_forces()["holder"][2], 0.1 - 2.0 * d
 
 
 @pytest.mark.mpi
-def test_pulling_a_tow_from_under_the_holder():
-    """Both faces slip: the pull is 2 μ F, whatever the contact stiffness; it is the tow's tension.
+@pytest.mark.parametrize("force", [0.4, 30.0])
+def test_height_between_flat_plates(force):
+    """The distance functions round their roots by 1e-4 mm, which moves a face by 5e-9 mm."""
+    place, pushed, exact = height(force)
+    assert place == pytest.approx(exact, abs=3e-8)
+    assert pushed == pytest.approx(-force, rel=1e-9)
+
+
+def pulled_out(force, mu):
+    """Pull [N] on a tow under the holder, and the tension in each of its cells.
 
     Pulled by 2 mm; the stick stretches by μp/k_t = 0.3 · 0.1/0.5 = 0.06 mm before.
     """
-    force, mu = 4.0, 0.3
     model = squeezed(force, mu=mu, pull=2.0)
     statics = Statics(model, force_tolerance=1e-9, limit=40)
     for _ in range(9):
         statics.step(0.1, keep=True)
     statics.step(0.1, keep=False)
-    assert model.reactions()[0, 0] == pytest.approx(-2.0 * mu * force, rel=1e-6)
-    tension = model.snapshot(1.0).section_forces[:, 0]
+    return -model.reactions()[0, 0], model.snapshot(1.0).section_forces[:, 0]
+
+
+@pytest.mark.mpi
+def test_pulling_a_tow_from_under_the_holder():
+    """Both faces slip: the pull is 2 μ F, whatever the stiffness; it is the tow's tension."""
+    force, mu = 4.0, 0.3
+    pull, tension = pulled_out(force, mu)
+    assert pull == pytest.approx(2.0 * mu * force, rel=1e-6)
     # Half-way along cell i the nodes behind it carry the load: falls linearly to the free end.
     middles = (np.arange(8) + 0.5) / 8.0
     assert tension == pytest.approx(2.0 * mu * force * (1.0 - middles), rel=1e-6)
