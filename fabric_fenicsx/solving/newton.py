@@ -155,7 +155,11 @@ class Newton:
         start = perf_counter()
         before = self.system.assemble_seconds
         snes = self.snes
-        snes.solve(None, self.x)
+        try:
+            snes.solve(None, self.x)
+        except PETSc.Error as error:
+            # Newer petsc4py wraps what came up in a callback, Ctrl-C among it.
+            raise (error.__cause__ or error) from None
         self.solve_seconds += perf_counter() - start - (self.system.assemble_seconds - before)
         done = snes.getIterationNumber()
         self.iterations += done
