@@ -48,6 +48,8 @@ LIMIT = 15
 TURNS = 25
 #: Steps in which the weight is put on where it is put on gradually, failed ones included.
 STEPS = 40
+#: A first step this much shorter than it should be is not tried.
+HARDLY = 10.0
 #: Round-off of the forces in a tow whose stiffness is EA over its positions, in units of theirs.
 ROUNDING = 20.0
 
@@ -260,6 +262,8 @@ class HangingTow:
                     return
             else:
                 step /= 3.0
+                if done == 0.0 and step < first / HARDLY:
+                    break
         self._restore(before)
         raise SolveError(
             f"a strip of {self.length:g} mm finds no balance under more than {done:.3g} of its "

@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 SMALL = 1e-9
 #: Second starts that leave this many times more than the best one, to first order, are left.
 HOPELESS = 4.0
+#: First starts of a form are left from here on.
+FAR_OFF = 30.0
 #: Shares of a step to first order that a fit may begin with.
 DAMPED = (1.0, 0.3, 0.1, 0.0)
 #: Values of a parameter that the readings jump with, as shares of the one found; then nearer ones.
@@ -66,9 +68,9 @@ def fit_from_grid(
     fits: list[Fit] = []
     followed: set[int] = set()
     for left, _, variant, start in promising:
-        # To first order is not the last word: one start of each form is fitted, and whatever is
-        # within a factor of the best.
-        if id(variant) in followed and left > HOPELESS * promising[0][0]:
+        # To first order is not the last word: one start of each form is fitted, unless it is far
+        # off, and whatever is within a factor of the best.
+        if left > (HOPELESS if id(variant) in followed else FAR_OFF) * promising[0][0]:
             continue
         followed.add(id(variant))
         model = (*base.variants, variant)
