@@ -1,13 +1,15 @@
 """Diagnose folders of published measurements and write what came out as docs/measured.md.
 
-    python scripts/measured_page.py FOLDER [FOLDER ...]
+    python scripts/measured_page.py FOLDER [FOLDER ...] [--law CSV]
 
 The readings themselves stay where they are. What a comment at the top of a measurement.yaml says
-of its source is quoted.
+of its source is quoted. With a measured bending law (columns curvature_1_per_m and moment_N, a
+moment per width) the law fitted to a cantilever is compared with it, which no fit has seen.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
@@ -15,6 +17,13 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+PICTURE = Path(__file__).parents[1] / "docs" / "images" / "measured_law.png"
+#: Curvatures at which the laws are compared in the table [1/m].
+SHOWN = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 15.0, 18.0)
 PAGE = Path(__file__).parents[1] / "docs" / "measured.md"
 OPENING = """# Published measurements, diagnosed
 
@@ -70,12 +79,65 @@ def section(folder: Path, report: dict[str, Any]) -> str:
     return "\n".join([*lines, "", ""])
 
 
+def law_section(fitted: pd.DataFrame, file: Path) -> str:
+    """The fitted bending law beside a measured one."""
+    measured = pd.read_csv(file, comment="#")
+    kappa, moment = 1e-3 * measured["curvature_1_per_m"], measured["moment_N"]
+    x, y, std = fitted["curvature_1_mm"], fitted["moment_N"], fitted["std_moment_N"]
+    rows = []
+    for at in SHOWN:
+        if 1e-3 * at <= min(float(x.iloc[-1]), float(kappa.iloc[-1])):
+            own, its = np.interp(1e-3 * at, x, y), np.interp(1e-3 * at, kappa, moment)
+            error = np.interp(1e-3 * at, x, std)
+            rows.append(f"| {at:g} | {own:.3f} ± {error:.3f} | {its:.3f} | {own / its - 1:+.1%} |")
+    both = kappa[kappa <= float(x.iloc[-1])]
+    grid = np.linspace(0.0, float(both.iloc[-1]), 200)[1:]
+    ratio = np.interp(grid, x, y) / np.interp(grid, kappa, moment) - 1.0
+    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+    axes = figure.subplots()
+    axes.fill_between(1e3 * x, y - 2 * std, y + 2 * std, color="#e3e7eb")
+    axes.plot(1e3 * x, y, color="#22577a", label="fitted to the hanging strip, ± 2 standard errors")
+    axes.plot(1e3 * kappa, moment, ".", color="#27313b", markersize=3, label="measured in bending")
+    axes.set_xlim(0.0, 1e3 * float(x.iloc[-1]))
+    axes.set_xlabel("curvature [1/m]")
+    axes.set_ylabel("moment per width [N]")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False, loc="lower right")
+    figure.savefig(PICTURE, dpi=120)
+    source = " ".join(
+        line.lstrip("# ") for line in file.read_text().splitlines() if line.startswith("#")
+    )
+    lines = [
+        "### Its bending law, against a measured one",
+        "",
+        f"The fit has seen the shape of the strip only. The curve below it was measured apart: "
+        f"{source}",
+        "",
+        f"Up to {1e3 * grid[-1]:.0f} 1/m the two differ by {np.sqrt(np.mean(ratio**2)):.1%} (root "
+        f"mean square), at most by {np.abs(ratio).max():.1%}.",
+        "",
+        "| curvature, 1/m | fitted moment, N | measured, N | difference |",
+        "|---|---|---|---|",
+        *rows,
+        "",
+        f"![Bending moment against curvature, fitted and measured](images/{PICTURE.name})",
+    ]
+    return "\n".join([*lines, "", ""])
+
+
 def main() -> None:
     """Write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("--law", type=Path)
+    given = parser.parse_args()
     text = OPENING
-    for name in sys.argv[1:]:
+    for folder in given.folders:
         with tempfile.TemporaryDirectory() as out:
-            text += section(Path(name), diagnosed(Path(name), Path(out)))
+            text += section(folder, diagnosed(folder, Path(out)))
+            table = Path(out) / "cantilever_law.csv"
+            if given.law is not None and table.exists():
+                text += law_section(pd.read_csv(table), given.law)
     PAGE.write_text(text.rstrip() + "\n")
 
 

@@ -232,6 +232,33 @@ def test_no_balance_is_told():
         tow.solve({"C1_MPa": 0.0})
 
 
+def test_a_strip_wound_up_does_not_spoil_the_next(exact):
+    # The tangent of one that cannot be factorised must not stay with the solver.
+    flat = {"C1_MPa": B / PER_C1}
+    before = exact.predict((), flat)[0]
+    both = (
+        *form(exact, ("residual_curvature", "constant")),
+        *form(exact, ("nonlinear_bending", "cubic")),
+    )
+    wild = {"C1_MPa": 5.6e6, "kappa0_1_mm": 1.75, "b_N_mm3": -18548.0}
+    with pytest.raises(SolveError, match="finds no balance"):
+        exact.predict(both, wild)
+    assert exact.predict((), flat)[0] == pytest.approx(before, abs=1e-6)
+
+
+def test_the_law_is_the_one_put_in(exact):
+    variants = form(exact, ("nonlinear_bending", "hyperbolic"))
+    law = exact.law(variants, SOFT)
+    soft = SOFT["m_s_N"] * law.at / (CRITICAL + law.at)
+    assert law.value == pytest.approx(REST * B * law.at + soft, rel=1e-6, abs=1e-12)
+    for name, value in SOFT.items():
+        step = 1e-5 * value
+        # Each model's law ends at the largest curvature that it reaches itself.
+        near = (exact.law(variants, SOFT | {name: value + d}) for d in (step, -step))
+        up, down = (np.interp(law.at[:-2], other.at, other.value) for other in near)
+        assert law.slopes[name][:-2] == pytest.approx((up - down) / (2 * step), rel=1e-3, abs=1e-9)
+
+
 def test_readings_come_sorted():
     folder = measured((180.0, 120.0), {}, sigma=0.1)
     (first, second) = folder.runs

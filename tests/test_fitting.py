@@ -1,0 +1,114 @@
+"""Fits of the loop: what a prediction's doubt allows for, and starts that least squares needs."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from measurements.sets import sixty
+
+from fabric_fenicsx.loop.effects import Parameter
+from fabric_fenicsx.loop.experiment import Readings
+from fabric_fenicsx.loop.fitting import fit
+from fabric_fenicsx.loop.measurement import read_measurement
+from fabric_fenicsx.loop.picture_frame import PictureFrame
+from fabric_fenicsx.loop.search import diagnose_test
+
+
+class Line:
+    """a + b t, read at t < 1 and held out at 3 < t < 4; one sigma is 1."""
+
+    test, quantity, noise, effects, notes = "line", "y", 1.0, (), ()
+    baseline = (Parameter("a", (0.0,)), Parameter("b", (0.0,)))
+
+    def __init__(self, rng):
+        self.t = np.concatenate([np.linspace(0.0, 1.0, 40), np.linspace(3.0, 4.0, 30)])
+        out = self.t > 2.0
+        self.readings = Readings(
+            observed=2.0 - 3.0 * self.t + rng.normal(size=70),
+            run=out.astype(np.int64),
+            holdout=out,
+            usable=np.ones(70, dtype=bool),
+            weight=np.ones(70),
+            names=("fitted", "held out"),
+            covariates={"t": self.t},
+        )
+
+    def predict(self, variants, values):
+        slopes = {"a": np.ones_like(self.t), "b": self.t}
+        return values["a"] + values["b"] * self.t, slopes
+
+    def law(self, variants, values):
+        return None
+
+
+def fitted(seed):
+    line = Line(np.random.default_rng(seed))
+    return line, fit(line, (), {"a": 0.0, "b": 0.0}, line.readings.fit)
+
+
+def test_what_is_foreseen_is_the_textbook_s():
+    line, model = fitted(1)
+    out = line.readings.holdout
+    J = np.column_stack([np.ones_like(line.t), line.t])
+    C = np.linalg.inv(J[~out].T @ J[~out])
+    r = model.residual[out]
+    exact = r @ np.linalg.solve(np.eye(out.sum()) + J[out] @ C @ J[out].T, r)
+    assert model.foreseen(out) == pytest.approx(np.sqrt(exact / out.sum()), rel=1e-9)
+    assert np.isnan(model.foreseen(np.zeros_like(out)))
+    doubt = model.error_of({"a": np.ones(2), "b": np.array([0.0, 3.5])}, noise=0.0)
+    scatter = np.sqrt(model.sum_of_squares / 38)
+    expected = [np.sqrt(C[0, 0]), np.sqrt(np.array([1, 3.5]) @ C @ np.array([1, 3.5]))]
+    assert doubt == pytest.approx(scatter * np.array(expected), rel=1e-9)
+
+
+def test_an_extrapolated_line_is_no_surprise():
+    raw, foreseen = [], []
+    for seed in range(300):
+        line, model = fitted(seed)
+        raw.append(model.rms(line.readings.holdout) ** 2)
+        foreseen.append(model.foreseen(line.readings.holdout) ** 2)
+    # χ² of 30 over 30: its mean over 300 lines is known to 0.015.
+    assert np.mean(foreseen) == pytest.approx(1.0, abs=0.06)
+    assert np.mean(raw) > 2.5
+
+
+def diagnosed(seed, name):
+    """A set of the independent generator, diagnosed, and what was put in."""
+    (recipe,) = (r for r in sixty(seed) if r.name == name)
+    with tempfile.TemporaryDirectory() as folder:
+        truth = recipe(Path(folder) / "set")
+        measurement = read_measurement(Path(folder) / "set")
+    return truth, diagnose_test(PictureFrame([measurement]))
+
+
+def test_free_travel_is_found_beyond_the_next_reading():
+    # Each reading that comes to lie on the other side of the engagement is a step in the sum of
+    # squares: from the nearest start least squares stays at 6.00 mm.
+    truth, found = diagnosed(6, "pair-rate_hardening-crosshead_backlash")
+    assert {e.name for e in found.effects} == {"rate_hardening", "crosshead_backlash"}
+    (travel,) = (e["parameters"]["d0"] for e in truth.effects if "d0" in e["parameters"])
+    assert found.final.values["free_travel_mm"] == pytest.approx(travel, rel=0.02)
+    assert found.holdout_after < 1.15 * truth.noise
+
+
+def test_every_form_is_fitted_from_its_best_start():
+    # To first order an exponential looks better than the square that it is.
+    truth, found = diagnosed(5, "shear_locking-square")
+    assert [e.name for e in found.effects] == ["shear_locking"]
+    angle = truth.effects[0]["parameters"]["locking_angle"]
+    assert found.final.variants[0].label == "power 2"
+    assert found.final.values["locking_angle_rad"] == pytest.approx(angle, rel=0.02)
+
+
+def test_one_rate_alone_foretells_another_only_within_its_doubt():
+    # The dashpot's coefficient is wrong by two standard errors, and the rate is four times higher.
+    truth, found = diagnosed(6, "shear_locking-square")
+    assert [e.name for e in found.effects] == ["shear_locking"]
+    assert found.holdout_after > 1.5 * truth.noise
+
+
+def test_nothing_is_named_where_the_fitted_readings_show_nothing():
+    for name in ("none-shear-logger", "none-shear-hold"):
+        for seed in (12, 16):
+            assert diagnosed(seed, name)[1].verdict == "no_effect"

@@ -1,0 +1,65 @@
+"""Rates of a crosshead found from its record alone, against the programmes that drove it."""
+
+import numpy as np
+import pytest
+from measurements.programmes import Frame, load_hold, sine, triangle
+
+from fabric_fenicsx.loop.programme import frame_programme
+
+FRAME = Frame()
+
+
+def found(programme, times, digits=None):
+    """The programme found, and the true speed at each reading."""
+    travel, speed = programme.drive(FRAME, times)
+    if digits is not None:
+        travel = np.round(travel, digits)
+    return frame_programme(times, travel, FRAME.length), speed
+
+
+def rates(p):
+    """At the readings, in their order."""
+    own = p.reading >= 0
+    return p.rate[own][np.argsort(p.reading[own])]
+
+
+@pytest.mark.parametrize("control", ["crosshead", "angle"])
+@pytest.mark.parametrize(("count", "least"), [(15, 10), (41, 34), (400, 380)])
+def test_legs_at_a_constant_rate(control, count, least):
+    driven = triangle(FRAME, 0.8, 0.0, 0.03, 2, control=control)
+    p, speed = found(driven, np.linspace(0.0, driven.duration, count))
+    assert p.certain.sum() >= least
+    # The rate at a corner is that of either side; such readings are not among the certain ones.
+    assert rates(p)[p.certain] == pytest.approx(speed[p.certain], rel=1e-6)
+
+
+def test_a_reading_beside_a_turn_counts_where_it_is_in_line():
+    driven = triangle(FRAME, 0.8, 0.0, 0.03, 1, control="angle")
+    # Turned half way between two readings.
+    p, _ = found(driven, np.linspace(0.0, driven.duration, 16))
+    assert p.certain[[7, 8]].all()
+    rounded = triangle(FRAME, 0.8, 0.0, 0.03, 1, control="angle", run_up=0.12 * driven.duration)
+    p, _ = found(rounded, np.linspace(0.0, driven.duration, 16))
+    assert not p.certain[[7, 8]].any()
+
+
+@pytest.mark.parametrize("digits", [2, 4, None])
+def test_holds_are_at_rest(digits):
+    driven = load_hold(FRAME, [0.4, 0.8], 0.03, 20.0, True)
+    times = np.linspace(0.0, driven.duration, 301)
+    p, speed = found(driven, times, digits)
+    at_rest = (speed == 0.0) & p.certain
+    assert at_rest.sum() > 0.9 * (speed == 0.0).sum()
+    assert (rates(p)[at_rest] == 0.0).all()
+    assert p.certain.mean() > 0.9
+
+
+def test_a_dense_sine_is_known_to_two_percent_and_a_sparse_one_not_at_all():
+    driven = sine(0.7, -0.7, 0.05)
+    p, speed = found(driven, np.linspace(0.0, driven.duration, 300))
+    away = np.abs(rates(p) - speed)[p.certain] / np.abs(speed).max()
+    assert p.certain.mean() > 0.85
+    assert away.max() < 0.02
+    # Five readings a cycle: what agrees does so by chance.
+    p, speed = found(driven, np.linspace(0.0, driven.duration, 13))
+    assert p.certain.sum() <= 2
