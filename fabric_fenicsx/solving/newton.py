@@ -120,8 +120,6 @@ class Newton:
             # Orderings found best on these nets: METIS on one rank, AMF on several.
             "mat_mumps_icntl_7": 5 if net.comm.size == 1 else 2,
             "mat_mumps_icntl_14": 50,
-            # No scaling: on these nets it only costs time.
-            "mat_mumps_icntl_8": 0,
         }.items():
             if not options.hasName(prefix + key):
                 options[prefix + key] = value
