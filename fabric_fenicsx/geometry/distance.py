@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyvista as pv
 from scipy import ndimage
 
 from .triangles import Triangles
@@ -36,6 +35,9 @@ def exact_distance(surface: Triangles, points: Array) -> Array:
     Trans. Vis. Comput. Graph. 11, 2005). Beyond the rim of an open sheet it tells on which side of
     the rim's tangent plane a point lies.
     """
+    # Half of the time of importing a model, and only tools from files need it.
+    import pyvista as pv
+
     faces = np.insert(surface.cells, 0, 3, axis=1).ravel()
     body = pv.PolyData(np.asarray(surface.points, dtype=np.float64), faces=faces)
     cloud = pv.PolyData(np.asarray(points, dtype=np.float64))
