@@ -139,3 +139,35 @@ def test_work_is_the_derivative_of_the_energy():
     difference = (energy(w + eps * h) - energy(w - eps * h)) / (2.0 * eps)
     put(w)
     assert np.sum(model.reactions().ravel() * h) == pytest.approx(difference, rel=1e-7)
+
+
+@pytest.mark.parametrize("limit", [1e6, LIMIT])
+def test_tangent_is_the_symmetric_derivative_of_the_residual(limit):
+    """By central differences, sticking and sliding; tows without stiffness leave it alone.
+
+    Cholesky reads one half of the matrix only: a tangent declared symmetric must be so.
+    """
+    net = plain_net(1, 1, 4.0, 2)
+    law = CrossoverLaw(translation=K, k1=5.0, k3=2.0, dashpot=0.0, alignment=8.0, slip_limit=limit)
+    model = Model(net, GivenSection((1e-9,) * 6), crossovers=law, comm=MPI.COMM_SELF)
+    system, disc = model.system, model.disc
+    x = disc.vector()
+    start = 0.5 * np.random.default_rng(5).normal(size=x.local_size)
+
+    def residual(values):
+        F = disc.vector()
+        x.array[:] = values
+        system.set_increment(x)
+        system.residual(F)
+        return F.array_r.copy()
+
+    step = 1e-6 * np.eye(len(start))
+    columns = [(residual(start + h) - residual(start - h)) / 2e-6 for h in step]
+    residual(start)
+    A = disc.matrix()
+    system.tangent(A)
+    tangent = A.convert("dense").getDenseArray()
+    assert np.abs(tangent).max() > K / 2.0
+    np.testing.assert_allclose(tangent, tangent.T, atol=1e-12 * K)
+    # Differences of forces of 20 N over 2e-6 have 1e-9 of round-off and 1e-11 of curvature.
+    np.testing.assert_allclose(tangent, np.column_stack(columns), atol=1e-7)
