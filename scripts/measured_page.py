@@ -104,14 +104,11 @@ def law_section(fitted: pd.DataFrame, file: Path) -> str:
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, loc="lower right")
     figure.savefig(PICTURE, dpi=120)
-    source = " ".join(
-        line.lstrip("# ") for line in file.read_text().splitlines() if line.startswith("#")
-    )
+    source = file.read_text().splitlines()[0].removeprefix("# SOURCE: ")
     lines = [
         "### Its bending law, against a measured one",
         "",
-        f"The fit has seen the shape of the strip only. The curve below it was measured apart: "
-        f"{source}",
+        f"The fit has seen the shape of the strip only. Bending was measured apart: {source}",
         "",
         f"Up to {1e3 * grid[-1]:.0f} 1/m the two differ by {np.sqrt(np.mean(ratio**2)):.1%} (root "
         f"mean square), at most by {np.abs(ratio).max():.1%}.",

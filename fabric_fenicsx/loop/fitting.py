@@ -144,7 +144,10 @@ def fit(
         key = x.tobytes()
         if key not in cache:
             cache.clear()
-            cache[key] = experiment.predict(variants, dict(zip(names, x.tolist(), strict=True)))
+            found = experiment.predict(variants, dict(zip(names, x.tolist(), strict=True)))
+            if not np.isfinite(found[0][used]).all():
+                raise SolveError("the model is not a number at these parameters")
+            cache[key] = found
         return cache[key]
 
     def residual(x: Array) -> Array:

@@ -130,13 +130,15 @@ def numpy_function(
 
     def evaluate(at: Mapping[str, Any]) -> list[Any]:
         values: list[Any] = []
-        for operator, operands in steps.operations:
-            if operator == "given":
-                values.append(at[operands])
-            elif operator == "number":
-                values.append(operands)
-            else:
-                values.append(OPERATORS[operator](*[values[i] for i in operands]))
+        # Outside of a law's range it is not a number, which is for the caller to see.
+        with np.errstate(all="ignore"):
+            for operator, operands in steps.operations:
+                if operator == "given":
+                    values.append(at[operands])
+                elif operator == "number":
+                    values.append(operands)
+                else:
+                    values.append(OPERATORS[operator](*[values[i] for i in operands]))
         return [values[k] for k in steps.results]
 
     return evaluate
