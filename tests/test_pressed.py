@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from solve import Statics
+from test_rigs import SMALL
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import single_tow
@@ -145,14 +146,7 @@ def test_tangent_with_a_free_height():
 
 def test_drape_with_a_holder_force(tmp_path):
     """The force is met at every step and the energies balance; a resumed run ends the same."""
-    small = {
-        "test": "drape",
-        "sheet": {"width_mm": 144, "length_mm": 144},
-        "punch_radius_mm": 30,
-        "hole_radius_mm": 34,
-        "edge_radius_mm": 8,
-        "punch_travel_mm": 18,
-        "duration_s": 18,
+    small = SMALL | {
         "holder_force_N": 80,
         "contact": {"friction": 0.2},
         "solver": PATIENT,

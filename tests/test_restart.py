@@ -9,6 +9,7 @@ from mpi4py import MPI
 import numpy as np
 import pandas as pd
 import pytest
+from test_rigs import SMALL
 
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.cases import DrapeCase
@@ -16,14 +17,7 @@ from fabric_fenicsx.rigs.common import Session
 
 # Everything that remembers: friction on the tools, the height of a pushed holder, a Maxwell branch,
 # friction and slip at the crossings, the viscosity of bending.
-CASE = {
-    "test": "drape",
-    "sheet": {"width_mm": 144, "length_mm": 144},
-    "punch_radius_mm": 30,
-    "hole_radius_mm": 34,
-    "edge_radius_mm": 8,
-    "punch_travel_mm": 18,
-    "duration_s": 18,
+CASE = SMALL | {
     "holder_force_N": 60,
     "contact": {"friction": 0.2},
     "crossover": {

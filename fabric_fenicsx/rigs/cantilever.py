@@ -19,7 +19,7 @@ from ..solving.model import Model, Support
 from ..solving.simulation import Run, simulate
 from ..solving.stepping import StepControl
 from .cases import CantileverCase
-from .common import Session, crossover_law, extend, tow_net, tow_sections, write_table
+from .common import Session, extend, fabric_model, tow_net, write_table
 from .fabrics import strip
 
 __all__ = ["build", "midline", "run"]
@@ -31,17 +31,14 @@ def build(case: CantileverCase, length: float, session: Session) -> Model:
     """The model of one specimen; its weight grows from nothing to all at time 1. Collective."""
     net = tow_net(case, strip(case, length), session)
     clamped = np.flatnonzero(net.points[:, 0] < 1e-9 * np.ptp(net.points))
-    sections, kind = tow_sections(case, net)
-    return Model(
+    return fabric_model(
+        case,
         net,
-        sections,
-        tow_section=kind,
-        section_law=case.tow.section_law,
-        crossovers=crossover_law(case.crossover, case.warp_spacing_mm, case.weft_spacing_mm),
+        (case.warp_spacing_mm, case.weft_spacing_mm),
+        session,
         gravity=(0.0, 0.0, -case.gravity_mm_s2),
         load=lambda time: time,
         supports=[Support(clamped, (0, 1, 2, 3, 4, 5))],
-        comm=session.comm,
     )
 
 

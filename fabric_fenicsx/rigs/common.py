@@ -24,6 +24,7 @@ from ..fabric.net import WARP, WEFT, Net
 from ..fabric.section import RectangularSection
 from ..fabric.sheet import Sheet
 from ..output.files import write_text
+from ..solving.model import Model
 from ..solving.parts import CrossoverLaw
 from ..solving.stepping import StepControl
 from .cases import Common, CrossoverKeys, SolverKeys, TowKeys
@@ -119,6 +120,30 @@ def crossover_law(keys: CrossoverKeys, warp_spacing: float, weft_spacing: float)
         alignment=keys.alignment_N_mm,
         laws=tuple(law.build(area) for law in keys.laws),
         slip_limit=keys.slip_limit_N,
+    )
+
+
+def fabric_model(
+    case: Common, net: Net, spacings: tuple[float, float], session: Session, **rig: Any
+) -> Model:
+    """The model of a case's tows and crossings on its net. Collective.
+
+    Args:
+        case: the case.
+        net: its net.
+        spacings: of the warp and of the weft tows [mm].
+        session: where and how it runs.
+        rig: what the rig adds; further arguments of Model.
+    """
+    sections, kind = tow_sections(case, net)
+    return Model(
+        net,
+        sections,
+        tow_section=kind,
+        section_law=case.tow.section_law,
+        crossovers=crossover_law(case.crossover, *spacings),
+        comm=session.comm,
+        **rig,
     )
 
 

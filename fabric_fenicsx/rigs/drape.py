@@ -31,11 +31,10 @@ from .cases import ContactKeys, DrapeCase
 from .common import (
     Session,
     control,
-    crossover_law,
     extend,
+    fabric_model,
     lowest,
     tow_net,
-    tow_sections,
     write_table,
 )
 from .fabrics import crossing_gap, flat_sheet
@@ -110,13 +109,11 @@ def build(case: DrapeCase, session: Session) -> Model:
     """The model of a drape case. Collective."""
     keys, weave = case.sheet, case.weave
     net = tow_net(case, flat_sheet(case, session.base), session, crossing_gap=crossing_gap(case))
-    sections, kind = tow_sections(case, net)
-    return Model(
+    return fabric_model(
+        case,
         net,
-        sections,
-        tow_section=kind,
-        section_law=case.tow.section_law,
-        crossovers=crossover_law(case.crossover, keys.warp_spacing_mm, keys.weft_spacing_mm),
+        (keys.warp_spacing_mm, keys.weft_spacing_mm),
+        session,
         gravity=(0.0, 0.0, -case.gravity_mm_s2),
         inertia=GeneralisedAlpha(case.solver.spectral_radius),
         mass_scale=case.solver.mass_scale,
@@ -126,7 +123,6 @@ def build(case: DrapeCase, session: Session) -> Model:
         pressed=pressed(case),
         supports=symmetry_planes(net) if case.symmetry == "quarter" else (),
         interlacing=None if weave is None else crossing_weights(weave, keys, net, session.base),
-        comm=session.comm,
     )
 
 

@@ -21,7 +21,7 @@ from ..output.snapshot import Snapshot
 from ..solving.model import Model, Support
 from ..solving.simulation import simulate
 from .cases import PictureFrameCase
-from .common import Session, control, crossover_law, extend, tow_net, tow_sections, write_table
+from .common import Session, control, extend, fabric_model, tow_net, write_table
 from .fabrics import woven_sheet
 
 __all__ = ["build", "crosshead", "frame_angle", "frame_ends", "normalised_force", "run"]
@@ -79,16 +79,13 @@ def frame_ends(net: Net, case: PictureFrameCase, place: Any = crosshead) -> Supp
 def build(case: PictureFrameCase, session: Session) -> Model:
     """The model of a picture frame. Collective."""
     net = tow_net(case, woven_sheet(case), session)
-    sections, kind = tow_sections(case, net)
-    return Model(
+    return fabric_model(
+        case,
         net,
-        sections,
-        tow_section=kind,
-        section_law=case.tow.section_law,
-        crossovers=crossover_law(case.crossover, case.warp_spacing_mm, case.weft_spacing_mm),
+        (case.warp_spacing_mm, case.weft_spacing_mm),
+        session,
         viscosity=case.tow.relaxation_time_s,
         supports=[frame_ends(net, case)],
-        comm=session.comm,
     )
 
 

@@ -6,7 +6,7 @@ Moments are per area of fabric, as everywhere in a case; angles in degrees.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -16,6 +16,12 @@ from .groups import Keys, NotNegative, Positive
 __all__ = ["ShearLawKeys"]
 
 
+def _built(keys: Any) -> Any:
+    """Have the law's constructor find what is wrong with its points."""
+    keys.build(1.0)
+    return keys
+
+
 class TabulatedSpringKeys(Keys):
     """Elastic moment through points, from (0, 0)."""
 
@@ -23,10 +29,7 @@ class TabulatedSpringKeys(Keys):
     angles_deg: list[NotNegative] = Field(description="shear angles, increasing from 0")
     moments_N_mm: list[NotNegative] = Field(description="moments per area there, not falling")
 
-    @model_validator(mode="after")
-    def _is_a_table(self) -> TabulatedSpringKeys:
-        self.build(1.0)
-        return self
+    _is_a_table = model_validator(mode="after")(_built)
 
     def build(self, area: float) -> shear_laws.ShearLaw:
         """The law of a crossing that stands for ``area`` [mm²]."""
@@ -53,10 +56,7 @@ class TabulatedDashpotKeys(Keys):
     rates_rad_s: list[NotNegative] = Field(description="rates of shear, increasing from 0")
     moments_N_mm: list[NotNegative] = Field(description="moments per area there, not falling")
 
-    @model_validator(mode="after")
-    def _is_a_table(self) -> TabulatedDashpotKeys:
-        self.build(1.0)
-        return self
+    _is_a_table = model_validator(mode="after")(_built)
 
     def build(self, area: float) -> shear_laws.ShearLaw:
         """The law of a crossing that stands for ``area`` [mm²]."""
