@@ -129,3 +129,26 @@ def set_state(model: Model, u, q) -> None:
         fields.u_n.x.array[:] = u[nodes].ravel()
         fields.q_n.x.array[:] = q[nodes].ravel()
         fields.w.x.array[:] = 0.0
+
+
+def taylor_remainders(model: Model, x, d, *, largest: float, factor: float = 1.0):
+    """Norms of R(x + ε d) − R(x) − ε K(x) d for ε from ``largest`` on, halved thrice.
+
+    ``factor`` multiplies the section forces of the tangent's geometric part.
+    """
+    system, disc = model.system, model.disc
+    y, F, A = disc.vector(), disc.vector(), disc.matrix()
+    # Linearised about x itself, the section forces are the current ones.
+    system.set_increment(x)
+    system.set_increment(x, linearise_from="last")
+    model.fields.section_forces.x.array[:] *= factor
+    system.tangent(A)
+    system.residual(F)
+    R, Kd = F.array_r.copy(), (A * d).array_r.copy()
+    found = []
+    for eps in largest / 2.0 ** np.arange(4):
+        y.array[:] = x.array_r + eps * d.array_r
+        system.set_increment(y)
+        system.residual(F)
+        found.append(np.linalg.norm(F.array_r - R - eps * Kd))
+    return np.array(found)

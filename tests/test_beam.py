@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import reference
 from scipy.optimize import brentq
-from solve import GivenSection, Statics, orders, random_rotation, set_loads
+from solve import GivenSection, Statics, orders, random_rotation, set_loads, taylor_remainders
 
 from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.solving.model import Model, Support
@@ -265,29 +265,11 @@ def bent_model(rng, *, moment):
 
 
 def remainders(model, rng, *, factor=1.0):
-    """Norms of R(x + ε d) − R(x) − ε K(x) d for ε halved thrice.
-
-    ``factor`` multiplies the section forces of the tangent's geometric part.
-    """
-    system, disc = model.system, model.disc
-    x, y, d, F = (disc.vector() for _ in range(4))
+    """What the tangent leaves of a change of the residual, about a random place."""
+    x, d = model.disc.vector(), model.disc.vector()
     x.array[:] = 0.2 * rng.normal(size=x.local_size)
     d.array[:] = rng.normal(size=x.local_size)
-    A = disc.matrix()
-    # Linearised about x itself, the section forces are the current ones.
-    system.set_increment(x)
-    system.set_increment(x, linearise_from="last")
-    model.fields.section_forces.x.array[:] *= factor
-    system.tangent(A)
-    system.residual(F)
-    R, Kd = F.array_r.copy(), (A * d).array_r.copy()
-    found = []
-    for eps in 1e-3 / 2.0 ** np.arange(4):
-        y.array[:] = x.array_r + eps * d.array_r
-        system.set_increment(y)
-        system.residual(F)
-        found.append(np.linalg.norm(F.array_r - R - eps * Kd))
-    return np.array(found)
+    return taylor_remainders(model, x, d, largest=1e-3, factor=factor)
 
 
 @pytest.mark.parametrize("moment", [0.0, 30.0])
