@@ -45,7 +45,7 @@ def check(
     console.print(
         f"about {cost.steps} steps, {cost.iterations} iterations and {_time(cost.seconds)} on one "
         "core; rough, by a factor of three either way. Forms that were never compiled here take "
-        "a minute or two more.",
+        "up to a minute more.",
         soft_wrap=True,
     )
 
