@@ -94,21 +94,20 @@ def spikes(residual: Array, readings: Readings, rows: Flags) -> Flags:
 
 
 def lone(residual: Array, readings: Readings, rows: Flags) -> Flags:
-    """Readings that a model misses by far while it meets their neighbours and all but a few, (n,).
+    """Readings that a model misses by far while it meets all but a few of their run, (n,).
 
-    None where there are more than a few of them: then it is the model that is wrong.
+    By themselves or two side by side; none of a run where there are more together, or more than a
+    few: then it is the model that is wrong.
     """
     z = np.abs(residual * readings.weight)
     scale = 1.4826 * float(np.median(z[rows])) if rows.any() else 0.0
-    far = rows & (z > LONE * scale)
-    beside = np.zeros_like(far)
-    own = np.flatnonzero(rows)
-    together = np.diff(readings.run[own]) == 0
-    beside[own[1:]] |= far[own[:-1]] & together
-    beside[own[:-1]] |= far[own[1:]] & together
-    found = far & ~beside
-    if found.sum() < far.sum() or found.sum() > max(2, MOST_LONE * rows.sum()):
-        return np.zeros_like(far)
+    found = np.zeros(len(z), dtype=bool)
+    for run in range(len(readings.names)):
+        own = np.flatnonzero(rows & (readings.run == run))
+        far = z[own] > LONE * scale
+        together = far[2:] & far[1:-1] & far[:-2]
+        if far.sum() <= max(2, MOST_LONE * len(own)) and not together.any():
+            found[own[far]] = True
     return found
 
 

@@ -44,6 +44,8 @@ LEAST = 4.0
 #: Sigmas beyond which a reading pulls a fit less: it may be wrong, or lie beyond a corner of a law
 #: that the fit has not reached, where least squares would stay.
 FAR = 3.0
+#: Scatter over noise up to which a residual without structure is noise: nobody knows that better.
+STATED = 1.25
 #: Probability below which no size of a residual excuses its structure.
 HOPELESS = 1e-8
 #: Share of the range that a reading is good to where no noise is given.
@@ -285,12 +287,13 @@ class _Search:
 
     def _fits(self, model: Fit) -> bool:
         """Whether a model leaves noise, in size, on what was fitted."""
-        if self.given:
-            white = self._whiteness(model)
-            if min(white.blocks, white.lags, white.period) < HOPELESS:
-                return False
+        white = self._whiteness(model)
+        # Of an estimated noise the means over stretches may be too large by themselves.
+        if min(white.lags, white.period, white.blocks if self.given else 1.0) < HOPELESS:
+            return False
         scatter = np.sqrt(model.sum_of_squares / model.freedom) / self._near
-        return bool(scatter <= max(1.1, _upper(model.freedom)))
+        allowed = 1.1 if white.structured else STATED
+        return bool(scatter <= max(allowed, _upper(model.freedom)))
 
     def _foretells(self, model: Fit) -> bool:
         """Whether a model predicts parts of the fitted readings better than the baseline does."""
@@ -315,10 +318,14 @@ class _Search:
 
     @property
     def _near(self) -> float:
-        """What a reading is good to: a curve read from a figure scatters less than it is right."""
+        """What a reading is good to, with the doubt of an estimate from n readings.
+
+        A curve read from a figure scatters less than it is right.
+        """
         if self.given:
             return self.noise
-        return max(self.noise, READ * float(np.ptp(self.readings.observed[self.rows])))
+        estimated = self.noise * (1.0 + 2.0 / np.sqrt(max(int(self.rows.sum()), 1)))
+        return max(estimated, READ * float(np.ptp(self.readings.observed[self.rows])))
 
     def _held_rows(self) -> Flags:
         return np.asarray(self.readings.holdout & self.readings.usable & ~self.outliers)

@@ -54,23 +54,25 @@ def fit_from_grid(
     Returns:
         The model with each form that has a solution.
     """
-    promising: list[tuple[float, int, Variant, _Start]] = []
+    promising: list[tuple[Variant, _Start]] = []
     for variant in variants:
         if set(base.values) & {p.name for p in variant.parameters}:
             continue
-        own: list[tuple[float, int, Variant, _Start]] = []
+        own: list[_Start] = []
         for one in signatures(experiment, base, variant, amplitudes=True):
             start = _to_first_order(experiment, base, one, robust)
             if start is not None:
-                own.append((start.left, len(promising) + len(own), variant, start))
-        promising += sorted(own)[:starts]
-    promising.sort()
+                own.append(start)
+        own.sort(key=lambda start: start.left)
+        promising += [(variant, start) for start in own[:starts]]
+    promising.sort(key=lambda one: one[1].left)
     fits: list[Fit] = []
     followed: set[int] = set()
-    for left, _, variant, start in promising:
+    for variant, start in promising:
         # To first order is not the last word: one start of each form is fitted, unless it is far
         # off, and whatever is within a factor of the best.
-        if left > (HOPELESS if id(variant) in followed else FAR_OFF) * promising[0][0]:
+        limit = HOPELESS if id(variant) in followed else FAR_OFF
+        if start.left > limit * promising[0][1].left:
             continue
         followed.add(id(variant))
         model = (*base.variants, variant)
