@@ -87,6 +87,10 @@ class Fit:
         left = float(r @ r - Gr @ np.linalg.solve(np.eye(G.shape[1]) + G.T @ G, Gr))
         return float(np.sqrt(max(left, 0.0) / len(r)))
 
+    def doubt(self, rows: Flags) -> float:
+        """Root mean square error of the expected readings there, for a noise of one unit."""
+        return float(np.sqrt(np.mean(np.sum((self.slopes[rows] @ self.root) ** 2, axis=1))))
+
     def error_of(self, slopes: Mapping[str, Array], noise: float) -> Array:
         """Standard error of a function of the parameters from its slopes in them, (n,) each."""
         count = len(next(iter(slopes.values())))
@@ -170,8 +174,8 @@ def fit(
         jac=jacobian,
         bounds=(lower, upper),
         x_scale="jac",
-        xtol=1e-9,
-        ftol=1e-10,
+        xtol=1e-8,
+        ftol=1e-8,
         gtol=1e-12,
         max_nfev=evaluations,
         loss="linear" if robust is None else "soft_l1",

@@ -21,7 +21,7 @@ SPIKE = 6.0
 #: ... and times the steps of the readings on both sides of them.
 PEAK = 3.0
 #: Sigmas, from the median, by which a model misses a lone reading; and the share of such readings.
-LONE, MOST_LONE = 7.0, 0.03
+LONE, MOST_LONE = 6.0, 0.03
 #: Below this a test says that something is left in the residual.
 LIMIT = 1e-3
 

@@ -44,6 +44,8 @@ LEAST = 4.0
 #: Sigmas beyond which a reading pulls a fit less: it may be wrong, or lie beyond a corner of a law
 #: that the fit has not reached, where least squares would stay.
 FAR = 3.0
+#: Share of the baseline's held-out error that may be left where a prediction is in doubt.
+MUCH = 0.25
 #: Scatter over noise up to which a residual without structure is noise: nobody knows that better.
 STATED = 1.25
 #: Probability below which no size of a residual excuses its structure.
@@ -126,7 +128,7 @@ class _Search:
             # A spike is seen better once the large part of the residual is gone.
             if not (singles and self._leave_out(singles[0].fit or self.baseline)):
                 break
-            candidates, singles = self._tried()
+            candidates, singles = self._tried(starts=1)
         if not self.given and singles:
             self.noise = self._noise_of(singles[0].fit or self.baseline)
         nearest: Model = (self.baseline, ())
@@ -137,7 +139,7 @@ class _Search:
         if not silent:
             nearest, explained = self._choose(singles)
             if not explained and self._leave_out(nearest[0]):
-                candidates, singles = self._tried()
+                candidates, singles = self._tried(starts=1)
                 nearest, explained = self._choose(singles)
             if self._explains(self.baseline) and not self._foretells(nearest[0]):
                 nearest, quiet = (self.baseline, ()), True
@@ -175,7 +177,7 @@ class _Search:
             notes=list(self.experiment.notes),
         )
 
-    def _tried(self) -> tuple[list[Candidate], list[Candidate]]:
+    def _tried(self, starts: int = 2) -> tuple[list[Candidate], list[Candidate]]:
         """Every effect by itself; then those that have a solution, the best first."""
         self.progress(0.0, "score tests")
         base, noise = self.baseline, self.noise
@@ -189,7 +191,7 @@ class _Search:
         ]
         for k, candidate in enumerate(candidates):
             self.progress(0.1 + 0.5 * k / len(candidates), f"fit {candidate.effect.name}")
-            candidate.fit = self._best_variant(self.baseline, candidate.effect)
+            candidate.fit = self._best_variant(self.baseline, candidate.effect, starts=starts)
         singles = [c for c in candidates if c.fit is not None]
         singles.sort(key=lambda c: self._criterion(c.fit))
         return candidates, singles
@@ -305,7 +307,10 @@ class _Search:
             return False
         out = self._held_rows()
         if out.any():
-            return model.foreseen(out) <= self._limit(out)
+            # What leans on the doubt of its parameters takes most of the error away at least.
+            doubt = np.sqrt(1.0 + model.doubt(out) ** 2)
+            most = max(self._limit(out) * doubt, MUCH * self.baseline.rms(out))
+            return bool(model.foreseen(out) <= self._limit(out) and model.rms(out) <= most)
         return int(self.rows.sum()) > len(model.values)
 
     def _foresees(self, model: Fit) -> bool:

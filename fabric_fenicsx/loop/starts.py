@@ -23,6 +23,10 @@ SMALL = 1e-9
 HOPELESS = 4.0
 #: First starts of a form are left from here on.
 FAR_OFF = 30.0
+#: Evaluations after which it shows which fits are worth going on with.
+FIRST_LOOK = 12
+#: ... those that leave no more than this many times what the best one does.
+WORTHWHILE = 2.0
 #: Shares of a step to first order that a fit may begin with.
 DAMPED = (1.0, 0.3, 0.1, 0.0)
 #: Values of a parameter that the readings jump with, as shares of the one found; then nearer ones.
@@ -78,10 +82,15 @@ def fit_from_grid(
         model = (*base.variants, variant)
         try:
             at = _damped(experiment, base, variant, start, robust)
-            found = fit(experiment, model, at, base.used, evaluations=evaluations, robust=robust)
+            found = fit(experiment, model, at, base.used, evaluations=FIRST_LOOK, robust=robust)
         except SolveError:
             continue
-        fits.append(_around_jumps(experiment, found, variant, evaluations, robust))
+        fits.append(found)
+    sizes = [_size((f.residual * f.weight)[f.used], robust) for f in fits]
+    for k, found in enumerate(fits):
+        if sizes[k] <= WORTHWHILE * min(sizes):
+            found = _going_on(experiment, found, evaluations, robust)
+            fits[k] = _around_jumps(experiment, found, evaluations, robust)
     return fits
 
 
@@ -142,15 +151,30 @@ def _damped(
     return best
 
 
+def _going_on(experiment: Experiment, found: Fit, evaluations: int, robust: float | None) -> Fit:
+    """A fit taken on from where it was left."""
+    try:
+        return fit(
+            experiment,
+            found.variants,
+            found.values,
+            found.used,
+            evaluations=evaluations,
+            robust=robust,
+        )
+    except SolveError:
+        return found
+
+
 def _around_jumps(
-    experiment: Experiment, found: Fit, variant: Variant, evaluations: int, robust: float | None
+    experiment: Experiment, found: Fit, evaluations: int, robust: float | None
 ) -> Fit:
     """A fit again from other values of a parameter that the readings jump with.
 
     The sum of squares has a step wherever a reading comes to lie on the other side of such a
     jump; least squares stays between two of them.
     """
-    names = [p.name for p in variant.parameters if p.jumps]
+    names = [p.name for p in found.variants[-1].parameters if p.jumps]
     for name in names:
         for shares in AROUND:
             starts = []
