@@ -26,7 +26,7 @@ FAR_OFF = 30.0
 #: Evaluations after which it shows which fits are worth going on with.
 FIRST_LOOK = 12
 #: ... those that leave no more than this many times what the best one does.
-WORTHWHILE = 2.0
+WORTHWHILE = 30.0
 #: Shares of a step to first order that a fit may begin with.
 DAMPED = (1.0, 0.3, 0.1, 0.0)
 #: Values of a parameter that the readings jump with, as shares of the one found; then nearer ones.
