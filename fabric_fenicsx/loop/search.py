@@ -34,7 +34,10 @@ Model = tuple[Fit, tuple[Effect, ...]]
 
 #: Probability of a score by chance, over all candidates together, below which it is followed
 #: where the baseline's residual is otherwise noise.
-ALARM = 1e-3
+ALARM = 0.01
+#: ... and below which it is enough that parts of the readings are predicted better at all; above
+#: it their error must fall below this share.
+CLEAR, CLEARLY = 1e-3, 0.8
 #: Held-out error over noise up to which a model explains the data.
 NEAR = 1.15
 #: χ² + k ln n by which a second effect must win, and by which a rival may lose.
@@ -141,7 +144,7 @@ class _Search:
             if not explained and self._leave_out(nearest[0]):
                 candidates, singles = self._tried(starts=1)
                 nearest, explained = self._choose(singles)
-            if self._explains(self.baseline) and not self._foretells(nearest[0]):
+            if self._explains(self.baseline) and not self._foretells(nearest, candidates):
                 nearest, quiet = (self.baseline, ()), True
         for candidate in candidates:
             if candidate.fit is not None:
@@ -297,9 +300,12 @@ class _Search:
         allowed = 1.1 if white.structured else STATED
         return bool(scatter <= max(allowed, _upper(model.freedom)))
 
-    def _foretells(self, model: Fit) -> bool:
+    def _foretells(self, model: Model, candidates: list[Candidate]) -> bool:
         """Whether a model predicts parts of the fitted readings better than the baseline does."""
-        return self._cross_validated(model) < self._cross_validated(self.baseline)
+        fitted, effects = model
+        chance = min((c.p_value for c in candidates if c.effect in effects), default=1.0)
+        share = 1.0 if chance < CLEAR else CLEARLY
+        return self._cross_validated(fitted) < share * self._cross_validated(self.baseline)
 
     def _explains(self, model: Fit) -> bool:
         """Whether a model leaves noise, on what was fitted and on what was held out."""
@@ -307,10 +313,14 @@ class _Search:
             return False
         out = self._held_rows()
         if out.any():
-            # What leans on the doubt of its parameters takes most of the error away at least.
+            if not model.variants:
+                return model.foreseen(out) <= self._limit(out, STATED)
+            if model.foreseen(out) > self._limit(out):
+                return False
+            # An effect that leans on the doubt of its parameters takes most of the error away.
             doubt = np.sqrt(1.0 + model.doubt(out) ** 2)
             most = max(self._limit(out) * doubt, MUCH * self.baseline.rms(out))
-            return bool(model.foreseen(out) <= self._limit(out) and model.rms(out) <= most)
+            return model.rms(out) <= most
         return int(self.rows.sum()) > len(model.values)
 
     def _foresees(self, model: Fit) -> bool:
@@ -318,8 +328,8 @@ class _Search:
         out = self._held_rows()
         return not out.any() or model.rms(out) <= self._limit(out)
 
-    def _limit(self, out: Flags) -> float:
-        return self._near * max(NEAR, _upper(int(out.sum())))
+    def _limit(self, out: Flags, least: float = NEAR) -> float:
+        return self._near * max(least, _upper(int(out.sum())))
 
     @property
     def _near(self) -> float:
