@@ -252,10 +252,10 @@ class _Search:
         if best > self._criterion(self.baseline) - LEAST:
             # What does not lower the criterion is not there, whatever a score says.
             return near[0], False
-        for model in near:
-            if self._explains(model[0]):
-                return model, True
-        return near[0], False
+        explaining = [model for model in near if self._explains(model[0])]
+        # Of those that fit alike, one whose prediction needs no excuse.
+        explaining.sort(key=lambda model: not self._foresees(model[0]))
+        return (explaining[0], True) if explaining else (near[0], False)
 
     def _pairs(self, singles: list[Candidate]) -> list[Model]:
         """The first few effects with each of the others, the stronger first."""
