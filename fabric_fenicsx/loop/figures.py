@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .diagnosis import Diagnosis
 from .fitting import Fit
-from .laws import law_table
 
 __all__ = [
     "candidates_figure",
@@ -214,22 +214,23 @@ def candidates_figure(diagnosis: Diagnosis) -> Figure | None:
     return figure
 
 
-def law_figure(diagnosis: Diagnosis) -> Figure | None:
-    """The material law, with twice its standard error, and the baseline's; None: there is none."""
-    table = law_table(diagnosis)
-    if table is None:
-        return None
+def law_figure(table: pd.DataFrame, label: str | None) -> Figure:
+    """The material law, with twice its standard error, and the baseline's.
+
+    Args:
+        table: of law_table.
+        label: of the model; None: it is the baseline.
+    """
     x, y = table.columns[:2]
     figure = _figure(3.2)
     axes = figure.subplots()
     axes.plot(
         table[x], table[f"baseline_{y}"], color=BEFORE, linestyle=(0, (4, 2)), label="baseline"
     )
-    model = shown_model(diagnosis)
-    if model is not None:
+    if label is not None:
         doubt = 2.0 * table[f"std_{y}"]
         axes.fill_between(table[x], table[y] - doubt, table[y] + doubt, color=FAINT)
-        axes.plot(table[x], table[y], color=AFTER, label=model[1])
+        axes.plot(table[x], table[y], color=AFTER, label=label)
     axes.set_xlabel(LAW_AXES[x])
     axes.set_ylabel(LAW_AXES[y])
     _legend(figure, np.array([[axes]]))

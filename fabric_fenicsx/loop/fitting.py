@@ -18,6 +18,7 @@ __all__ = [
     "fit",
     "orthogonal_to",
     "parameters_of",
+    "soft_size",
     "weighted",
 ]
 
@@ -253,6 +254,13 @@ def without(experiment: Experiment, model: Fit, variants: Sequence[Variant]) -> 
         residual=experiment.readings.observed - expected,
         expected=expected,
     )
+
+
+def soft_size(r: Array, robust: float | None) -> float:
+    """Sum of squares, where residuals beyond a limit count by their size only (soft L1)."""
+    if robust is None:
+        return float(r @ r)
+    return float(2.0 * robust**2 * np.sum(np.sqrt(1.0 + (r / robust) ** 2) - 1.0))
 
 
 def orthogonal_to(J: Array, columns: Array) -> Array:

@@ -5,21 +5,19 @@ from __future__ import annotations
 import pandas as pd
 
 from .diagnosis import Diagnosis
+from .fitting import Fit
 
 __all__ = ["law_table"]
 
 
-def law_table(diagnosis: Diagnosis) -> pd.DataFrame | None:
-    """The law of the model that is reported, beside that of the baseline.
+def law_table(diagnosis: Diagnosis, model: Fit) -> pd.DataFrame | None:
+    """The law of a model, beside that of the baseline.
 
     Returns:
         What it depends on, the law, its standard error (``std_...``) and the law of the fitted
         baseline (``baseline_...``), with units in the names; None where the test has no such law.
     """
     experiment, baseline = diagnosis.experiment, diagnosis.baseline
-    model = diagnosis.final
-    if diagnosis.verdict == "unexplained" and diagnosis.best is not None:
-        model = diagnosis.best
     law = experiment.law(model.variants, model.values)
     if law is None:
         return None

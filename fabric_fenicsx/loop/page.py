@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import pandas as pd
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
@@ -39,13 +40,14 @@ def write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]]
     """
     sections = []
     for diagnosis, report in parts:
-        figures = _figures(diagnosis, report)
+        model = shown_model(diagnosis)
+        law = law_table(diagnosis, model[0] if model is not None else diagnosis.baseline)
+        figures = _figures(diagnosis, report, law)
         for name, (figure, _) in figures.items():
             # Laid out once for both formats.
             figure.draw_without_rendering()
             figure.set_layout_engine("none")
             figure.savefig(folder / f"{report['test']}_{name}.png", dpi=DOTS)
-        law = law_table(diagnosis)
         if law is not None:
             law.to_csv(folder / f"{report['test']}_law.csv", index=False)
         sections.append(
@@ -87,7 +89,9 @@ def chance(value: float | None) -> Markup:
     return number(value, 2)
 
 
-def _figures(diagnosis: Diagnosis, report: Mapping[str, Any]) -> dict[str, tuple[Figure, str]]:
+def _figures(
+    diagnosis: Diagnosis, report: Mapping[str, Any], law: pd.DataFrame | None
+) -> dict[str, tuple[Figure, str]]:
     """Figures by name, each with its caption."""
     model = shown_model(diagnosis)
     with_model = f" and the model {model[1]}" if model is not None else ""
@@ -102,9 +106,9 @@ def _figures(diagnosis: Diagnosis, report: Mapping[str, Any]) -> dict[str, tuple
             "without a pattern inside the band.",
         ),
     }
-    law = law_figure(diagnosis)
     if law is not None:
-        made["law"] = (law, f"The fitted law{with_model}; the band is twice its standard error.")
+        drawn = law_figure(law, model[1] if model is not None else None)
+        made["law"] = (drawn, f"The fitted law{with_model}; the band is twice its standard error.")
     candidates = candidates_figure(diagnosis)
     if candidates is not None:
         made["candidates"] = (candidates, "Errors with each effect added to the baseline alone.")

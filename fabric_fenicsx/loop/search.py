@@ -21,7 +21,7 @@ from ..errors import SolveError
 from .diagnosis import Candidate, Diagnosis, Verdict
 from .effects import Effect
 from .experiment import Experiment
-from .fitting import Fit, fit, without
+from .fitting import Fit, fit, soft_size, without
 from .noise import Whiteness, estimated_noise, lone, spikes, whiteness
 from .scores import score_tests
 from .starts import fit_from_grid
@@ -205,9 +205,8 @@ class _Search:
         """χ² + k ln n; smaller is better. Residuals beyond a limit count by their size only."""
         if model is None:
             return float("inf")
-        limit = FAR * (noise or self.noise)
-        z = (model.residual * model.weight)[model.used] / limit
-        size = 2.0 * FAR**2 * float(np.sum(np.sqrt(1.0 + z**2) - 1.0))
+        z = (model.residual * model.weight)[model.used] / (noise or self.noise)
+        size = soft_size(z, FAR)
         return size + len(model.values) * float(np.log(max(int(model.used.sum()), 2)))
 
     def _best_variant(self, base: Fit, effect: Effect, *, starts: int = 2) -> Fit | None:

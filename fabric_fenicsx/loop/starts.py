@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ..errors import SolveError
 from .effects import Parameter, Variant
 from .experiment import Experiment
-from .fitting import Fit, fit, parameters_of, weighted
+from .fitting import Fit, fit, parameters_of, soft_size, weighted
 
 __all__ = ["SMALL", "Signature", "fit_from_grid", "signatures"]
 
@@ -86,10 +86,10 @@ def fit_from_grid(
         except SolveError:
             continue
         fits.append(found)
-    sizes = [_size((f.residual * f.weight)[f.used], robust) for f in fits]
+    sizes = [soft_size((f.residual * f.weight)[f.used], robust) for f in fits]
     for k, found in enumerate(fits):
         if sizes[k] <= WORTHWHILE * min(sizes):
-            found = _going_on(experiment, found, evaluations, robust)
+            found = _again(experiment, found, found.values, evaluations, robust)
             fits[k] = _around_jumps(experiment, found, evaluations, robust)
     return fits
 
@@ -116,7 +116,7 @@ def _to_first_order(
     scale[scale == 0.0] = 1.0
     step = np.linalg.lstsq(J / scale, r, rcond=1e-10)[0] / scale
     by_name = dict(zip(one.slopes, step.tolist(), strict=True))
-    return _Start(one.at, by_name, _size(r - J @ step, robust))
+    return _Start(one.at, by_name, soft_size(r - J @ step, robust))
 
 
 def _damped(
@@ -141,7 +141,7 @@ def _damped(
         except SolveError:
             continue
         r = ((experiment.readings.observed - expected) * base.weight)[base.used]
-        size = _size(r, robust)
+        size = soft_size(r, robust)
         if size < left:
             best, left = at, size
         if share == 1.0 and size < 2.0 * start.left:
@@ -151,13 +151,19 @@ def _damped(
     return best
 
 
-def _going_on(experiment: Experiment, found: Fit, evaluations: int, robust: float | None) -> Fit:
-    """A fit taken on from where it was left."""
+def _again(
+    experiment: Experiment,
+    found: Fit,
+    start: Mapping[str, float],
+    evaluations: int,
+    robust: float | None,
+) -> Fit:
+    """A fit of the same model from other values; the old one where there is no solution."""
     try:
         return fit(
             experiment,
             found.variants,
-            found.values,
+            start,
             found.used,
             evaluations=evaluations,
             robust=robust,
@@ -192,29 +198,12 @@ def _around_jumps(
                 break
             start = min(starts, key=lambda s: s.left)
             moved = {n: v + start.step.get(n, 0.0) for n, v in start.at.items()}
-            try:
-                again = fit(
-                    experiment,
-                    found.variants,
-                    moved,
-                    found.used,
-                    evaluations=evaluations,
-                    robust=robust,
-                )
-            except SolveError:
-                continue
+            again = _again(experiment, found, moved, evaluations, robust)
             rows = found.used
-            sizes = [_size((f.residual * f.weight)[rows], robust) for f in (again, found)]
+            sizes = [soft_size((f.residual * f.weight)[rows], robust) for f in (again, found)]
             if sizes[0] < sizes[1]:
                 found = again
     return found
-
-
-def _size(r: Array, robust: float | None) -> float:
-    """Sum of squares, where residuals beyond a limit count by their size only (soft L1)."""
-    if robust is None:
-        return float(r @ r)
-    return float(2.0 * robust**2 * np.sum(np.sqrt(1.0 + (r / robust) ** 2) - 1.0))
 
 
 @dataclass(frozen=True, slots=True)
