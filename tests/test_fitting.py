@@ -73,6 +73,21 @@ def test_an_extrapolated_line_is_no_surprise():
     assert np.mean(raw) > 2.5
 
 
+def test_what_the_data_do_not_tell_is_not_certain():
+    # Twice the same column: only the sum of both is known, and to 1/sqrt(40).
+    line = Line(np.random.default_rng(3))
+    line.predict = lambda variants, values: (
+        np.full(70, values["a"] + values["b"]),
+        {"a": np.ones(70), "b": np.ones(70)},
+    )
+    model = fit(line, (), {"a": 0.0, "b": 0.0}, line.readings.fit)
+    assert model.errors_at(1.0)["a"] > 1e4 and model.errors_at(1.0)["b"] > 1e4
+    assert model.correlated == (("a", "b"),)
+    both = {"a": np.ones(1), "b": np.ones(1)}
+    scatter = np.sqrt(model.sum_of_squares / 38)
+    assert model.error_of(both, noise=1.0) == pytest.approx(scatter / np.sqrt(40), rel=1e-4)
+
+
 def diagnosed(seed, name):
     """A set of the independent generator, diagnosed, and what was put in."""
     (recipe,) = (r for r in sixty(seed) if r.name == name)
@@ -99,6 +114,26 @@ def test_every_form_is_fitted_from_its_best_start():
     angle = truth.effects[0]["parameters"]["locking_angle"]
     assert found.final.variants[0].label == "power 2"
     assert found.final.values["locking_angle_rad"] == pytest.approx(angle, rel=0.02)
+
+
+def test_two_rates_do_not_tell_a_power():
+    # Any power between nothing and one fits two rates; a negative part would feed the fabric.
+    truth, found = diagnosed(10, "rate_hardening-thinning_alone")
+    assert [e.name for e in found.effects] == ["rate_hardening"]
+    assert found.rivals["rate_hardening"] == ["crossover_friction"]
+    assert found.final.values["c_n_N_s_n"] > 0.0
+    assert found.final.errors_at(truth.noise)["n"] > 1.0
+    assert found.holdout_after < 0.5 * found.holdout_before
+
+
+def test_a_form_that_fits_as_well_may_foretell_better():
+    # Beyond the fitted angles a square of locking falls behind the cube that it is.
+    truth, found = diagnosed(10, "shear_locking-cube")
+    assert [e.name for e in found.effects] == ["shear_locking"]
+    assert found.final.variants[0].label == "power 3"
+    (square,) = (c for c in found.candidates if c.effect.name == "shear_locking")
+    assert square.fit.variants[0].label == "power 2"
+    assert found.holdout_after < 1.2 * truth.noise < square.holdout
 
 
 def test_one_rate_alone_foretells_another_only_within_its_doubt():

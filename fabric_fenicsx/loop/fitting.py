@@ -26,6 +26,8 @@ Array = npt.NDArray[np.float64]
 
 #: Parameters whose estimates correlate more than this are told in the report.
 CORRELATED = 0.98
+#: Least information about a combination of parameters, as a share of the most: round-off.
+LEAST_KNOWN = 1e-14
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,16 +282,18 @@ def _uncertainty(J: Array) -> tuple[Array, Array, Array]:
     """Standard errors (infinite where nothing depends on it), correlations, root of the covariance.
 
     All for a noise of one unit; the covariance is root rootᵀ, without what nothing depends on.
+    Combinations of parameters that the data say nothing about are as uncertain as round-off allows
+    to tell.
     """
     scale = np.linalg.norm(J, axis=0)
     dead = scale == 0.0
     safe = np.where(dead, 1.0, scale)
     information = (J / safe).T @ (J / safe)
     information[dead, dead] = 1.0
-    scaled = np.linalg.pinv(information, rcond=1e-14, hermitian=True)
-    std = np.sqrt(np.maximum(np.diag(scaled), 0.0))
-    correlation = scaled / np.maximum(np.outer(std, std), 1e-300)
-    values, vectors = np.linalg.eigh(scaled)
-    root = vectors * np.sqrt(np.maximum(values, 0.0)) / safe[:, None]
+    known, vectors = np.linalg.eigh(information)
+    scaled_root = vectors / np.sqrt(np.maximum(known, LEAST_KNOWN * known[-1]))
+    std = np.linalg.norm(scaled_root, axis=1)
+    correlation = (scaled_root @ scaled_root.T) / np.outer(std, std)
+    root = scaled_root / safe[:, None]
     root[dead] = 0.0
     return np.where(dead, np.inf, std / safe), correlation, root

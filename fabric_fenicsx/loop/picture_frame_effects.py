@@ -176,7 +176,8 @@ PICTURE_FRAME_EFFECTS = (
             FrameVariant(
                 "power law",
                 (
-                    Parameter("c_n_N_s_n", amplitude=True, meaning="moment per rate^n"),
+                    # Negative, it would feed the fabric with energy at some rate.
+                    Parameter("c_n_N_s_n", lower=0.0, amplitude=True, meaning="moment per rate^n"),
                     Parameter("n", (0.3, 0.6, 1.5, 2.0), 0.1, 4.0, meaning="power of the rate"),
                 ),
                 laws=lambda p: (PowerDashpot(p["c_n_N_s_n"], p["n"], floor=1e-7),),

@@ -3,7 +3,8 @@
     score      the residual's projection on the candidate's signature, the model's sensitivity to
                its amplitude at zero, after what the baseline can absorb: one extra solution
     fit        the whole model again, with the candidate in it
-    criterion  χ² + k ln n of the fitted readings (Schwarz); held-out readings never choose
+    criterion  χ² + k ln n of the fitted readings (Schwarz); held-out readings choose only between
+               models that these cannot tell apart
 
 What is accepted must leave noise in the fitted readings and bring the held-out error near it.
 """
@@ -57,6 +58,8 @@ HOPELESS = 1e-8
 READ = 0.005
 #: Times that readings are left out, from ever better models.
 ROUNDS = 3
+#: Forms of an effect, the best ones, that are fitted again when readings have been left out.
+KEPT = 3
 #: Effects at most: any three of them would fit almost anything.
 MOST = 2
 #: Effects whose pairs with every other are tried where no single one explains the data.
@@ -96,6 +99,7 @@ class _Search:
         start = {p.name: p.starts[0] for p in experiment.baseline}
         self.outliers = np.zeros(len(self.readings.observed), dtype=bool)
         self.baseline = fit(experiment, (), start, self.readings.fit)
+        self._forms: dict[int, list[Fit]] = {}
         self._validated: dict[int, float] = {}
         # Their ids stay theirs as long as they live.
         self._kept: list[Fit] = []
@@ -131,7 +135,7 @@ class _Search:
             # A spike is seen better once the large part of the residual is gone.
             if not (singles and self._leave_out(singles[0].fit or self.baseline)):
                 break
-            candidates, singles = self._tried(starts=1)
+            candidates, singles = self._tried(again=True)
         if not self.given and singles:
             self.noise = self._noise_of(singles[0].fit or self.baseline)
         nearest: Model = (self.baseline, ())
@@ -142,7 +146,7 @@ class _Search:
         if not silent:
             nearest, explained = self._choose(singles)
             if not explained and self._leave_out(nearest[0]):
-                candidates, singles = self._tried(starts=1)
+                candidates, singles = self._tried(again=True)
                 nearest, explained = self._choose(singles)
             if self._explains(self.baseline) and not self._foretells(nearest, candidates):
                 nearest, quiet = (self.baseline, ()), True
@@ -180,8 +184,12 @@ class _Search:
             notes=list(self.experiment.notes),
         )
 
-    def _tried(self, starts: int = 2) -> tuple[list[Candidate], list[Candidate]]:
-        """Every effect by itself; then those that have a solution, the best first."""
+    def _tried(self, again: bool = False) -> tuple[list[Candidate], list[Candidate]]:
+        """Every effect by itself; then those that have a solution, the best first.
+
+        Args:
+            again: the fits go on from those of the last time.
+        """
         self.progress(0.0, "score tests")
         base, noise = self.baseline, self.noise
         candidates = [
@@ -194,7 +202,11 @@ class _Search:
         ]
         for k, candidate in enumerate(candidates):
             self.progress(0.1 + 0.5 * k / len(candidates), f"fit {candidate.effect.name}")
-            candidate.fit = self._best_variant(self.baseline, candidate.effect, starts=starts)
+            if again:
+                self._forms[k] = self._fitted_again(self._forms[k])
+            else:
+                self._forms[k] = self._forms_of(self.baseline, candidate.effect)
+            candidate.fit = min(self._forms[k], key=self._criterion, default=None)
         singles = [c for c in candidates if c.fit is not None]
         singles.sort(key=lambda c: self._criterion(c.fit))
         return candidates, singles
@@ -209,11 +221,29 @@ class _Search:
         size = soft_size(z, FAR)
         return size + len(model.values) * float(np.log(max(int(model.used.sum()), 2)))
 
-    def _best_variant(self, base: Fit, effect: Effect, *, starts: int = 2) -> Fit | None:
-        fits = fit_from_grid(
-            self.experiment, base, effect.variants, starts=starts, robust=FAR * self.noise
-        )
-        return min(fits, key=self._criterion, default=None)
+    def _forms_of(self, base: Fit, effect: Effect) -> list[Fit]:
+        return fit_from_grid(self.experiment, base, effect.variants, robust=FAR * self.noise)
+
+    def _best_variant(self, base: Fit, effect: Effect) -> Fit | None:
+        return min(self._forms_of(base, effect), key=self._criterion, default=None)
+
+    def _fitted_again(self, forms: list[Fit]) -> list[Fit]:
+        """The best of some models, fitted to the readings that are fitted now."""
+        fits = []
+        for model in sorted(forms, key=self._criterion)[:KEPT]:
+            try:
+                fits.append(
+                    fit(
+                        self.experiment,
+                        model.variants,
+                        model.values,
+                        self.rows,
+                        robust=FAR * self.noise,
+                    )
+                )
+            except SolveError:
+                continue
+        return fits
 
     def _choose(self, singles: list[Candidate]) -> tuple[Model, bool]:
         """The best model of one effect, or of two where one does not explain the data.
@@ -224,7 +254,8 @@ class _Search:
         ones: list[Model] = [(c.fit, (c.effect,)) for c in singles if c.fit is not None]
         if not ones:
             return (self.baseline, ()), False
-        single, explained = self._first_that_explains(ones)
+        forms = [(f, (self.effects[k],)) for k, found in self._forms.items() for f in found]
+        single, explained = self._first_that_explains(ones, forms)
         # Only where the residual still shows structure, or a prediction leans on how uncertain it
         # is, is a second effect looked for.
         if explained and not self._whiteness(single[0]).structured and self._foresees(single[0]):
@@ -242,8 +273,16 @@ class _Search:
         enough = gain > (-LEAST if alone else DECISIVE)
         return (pair, True) if enough and better and both_explain else (single, True)
 
-    def _first_that_explains(self, models: list[Model]) -> tuple[Model, bool]:
-        """Of those that fit all but equally well, the best in cross-validation that explains."""
+    def _first_that_explains(
+        self, models: list[Model], forms: Sequence[Model] = ()
+    ) -> tuple[Model, bool]:
+        """Of those that fit all but equally well, the best in cross-validation that explains.
+
+        Args:
+            models: of each effect, or pair of effects, the form that fits best.
+            forms: all that were fitted; asked where the best ones do not predict what was held
+                out, and these fit as well.
+        """
         best = min(self._criterion(model) for model, _ in models)
         near = [m for m in models if self._criterion(m[0]) < best + DECISIVE]
         if len(near) > 1:
@@ -252,6 +291,10 @@ class _Search:
             # What does not lower the criterion is not there, whatever a score says.
             return near[0], False
         explaining = [model for model in near if self._explains(model[0])]
+        if not any(self._foresees(model[0]) for model in explaining):
+            other = [m for m in forms if self._criterion(m[0]) < best + DECISIVE]
+            other.sort(key=lambda m: self._criterion(m[0]))
+            explaining += [model for model in other if self._explains(model[0])]
         # Of those that fit alike, one whose prediction needs no excuse.
         explaining.sort(key=lambda model: not self._foresees(model[0]))
         return (explaining[0], True) if explaining else (near[0], False)

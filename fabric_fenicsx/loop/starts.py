@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import lsq_linear
 
 from ..errors import SolveError
 from .effects import Parameter, Variant
@@ -64,7 +65,8 @@ def fit_from_grid(
             continue
         own: list[_Start] = []
         for one in signatures(experiment, base, variant, amplitudes=True):
-            start = _to_first_order(experiment, base, one, robust)
+            model = (*base.variants, variant)
+            start = _to_first_order(experiment, base, model, one, robust)
             if start is not None:
                 own.append(start)
         own.sort(key=lambda start: start.left)
@@ -104,9 +106,13 @@ class _Start:
 
 
 def _to_first_order(
-    experiment: Experiment, base: Fit, one: Signature, robust: float | None
+    experiment: Experiment,
+    base: Fit,
+    variants: Sequence[Variant],
+    one: Signature,
+    robust: float | None,
 ) -> _Start | None:
-    """The step that least squares would take, and the sum of squares after it."""
+    """The step that least squares would take within bounds, and the sum of squares after it."""
     rows = base.used
     r = (experiment.readings.observed - one.expected)[rows] * base.weight[rows]
     J = weighted(one.slopes, one.slopes, rows, base.weight)
@@ -114,7 +120,13 @@ def _to_first_order(
         return None
     scale = np.linalg.norm(J, axis=0)
     scale[scale == 0.0] = 1.0
-    step = np.linalg.lstsq(J / scale, r, rcond=1e-10)[0] / scale
+    step = np.linalg.lstsq(J / scale, r, rcond=1e-10)[0]
+    bounds = {p.name: p for p in parameters_of(experiment, variants)}
+    lower = np.array([bounds[n].lower - one.at[n] for n in one.slopes]) * scale
+    upper = np.array([bounds[n].upper - one.at[n] for n in one.slopes]) * scale
+    if not ((lower <= step) & (step <= upper)).all():
+        step = lsq_linear(J / scale, r, (lower, upper), method="bvls").x
+    step /= scale
     by_name = dict(zip(one.slopes, step.tolist(), strict=True))
     return _Start(one.at, by_name, soft_size(r - J @ step, robust))
 
@@ -191,7 +203,8 @@ def _around_jumps(
                 except SolveError:
                     continue
                 rest = {n: slopes[n] for n in found.values if n != name}
-                start = _to_first_order(experiment, found, Signature(at, expected, rest), robust)
+                own = Signature(at, expected, rest)
+                start = _to_first_order(experiment, found, found.variants, own, robust)
                 if start is not None:
                     starts.append(start)
             if not starts:

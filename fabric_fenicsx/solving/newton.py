@@ -88,6 +88,7 @@ class Newton:
         self._held.array[self._fixed] = 1.0
         self._free.set(1.0)
         self._free.axpy(-1.0, self._held)
+        self._moved, self._carried = net.vector(), net.vector()
         self._target = np.zeros(len(fixed))
         self._history: list[float] = []
         self._fresh = True
@@ -168,6 +169,8 @@ class Newton:
             # PETSc clears a factor's error after a zero pivot only; after any other one this solver
             # would fail for good.
             self._solvers.pop(self._symmetric).destroy()
+        # PETSc keeps what Python has dropped until all ranks come here.
+        PETSc.garbage_cleanup(self.system.net.comm)
         return Outcome(
             converged=reason > 0,
             reason=self._words(reason),
@@ -252,12 +255,12 @@ class Newton:
 
         So prescribed motion enters through the linear solve.
         """
-        moved, force = b.duplicate(), b.duplicate()
+        moved, carried = self._moved, self._carried
         moved.pointwiseMult(self._held, b)
         if moved.norm(PETSc.NormType.NORM_INFINITY) > 0.0:
-            self._whole[self._symmetric].mult(moved, force)
-            force.pointwiseMult(force, self._free)
-            b.axpy(-1.0, force)
+            self._whole[self._symmetric].mult(moved, carried)
+            carried.pointwiseMult(carried, self._free)
+            b.axpy(-1.0, carried)
 
     def _free_dyads(self) -> list[Dyad]:
         """The dyads, without the rows whose increment is prescribed."""
