@@ -81,14 +81,14 @@ class Fit:
 
         A prediction is as uncertain as the parameters it is made with, and its errors go together:
         with G Gᵀ the covariance of what is expected, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum
-        of squares, by Woodbury's identity. NaN if there are none.
+        of squares, by the singular values of G. NaN if there are none.
         """
         r, G = (self.residual * self.weight)[rows], self.slopes[rows] @ self.root
         if len(r) == 0:
             return float("nan")
-        Gr = G.T @ r
-        left = float(r @ r - Gr @ np.linalg.solve(np.eye(G.shape[1]) + G.T @ G, Gr))
-        return float(np.sqrt(max(left, 0.0) / len(r)))
+        along, size, _ = np.linalg.svd(G, full_matrices=False)
+        allowed = float(np.sum((along.T @ r) ** 2 / (1.0 + 1.0 / np.maximum(size, 1e-150) ** 2)))
+        return float(np.sqrt(max(float(r @ r) - allowed, 0.0) / len(r)))
 
     def doubt(self, rows: Flags) -> float:
         """Root mean square error of the expected readings there, for a noise of one unit."""
