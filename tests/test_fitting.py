@@ -1,6 +1,7 @@
 """Fits of the loop: what a prediction's doubt allows for, and starts that least squares needs."""
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,10 @@ def test_what_the_data_do_not_tell_is_not_certain():
     both = {"a": np.ones(1), "b": np.ones(1)}
     scatter = np.sqrt(model.sum_of_squares / 38)
     assert model.error_of(both, noise=1.0) == pytest.approx(scatter / np.sqrt(40), rel=1e-4)
+    # However large the doubt, what no parameter can change must still be foreseen.
+    out = line.readings.holdout
+    lost = replace(model, root=1e20 * model.root)
+    assert lost.foreseen(out) == pytest.approx(np.std(model.residual[out]), rel=1e-6)
 
 
 def diagnosed(seed, name):
