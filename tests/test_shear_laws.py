@@ -11,15 +11,16 @@ from ufl import as_ufl, as_vector
 
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.fabric.section import RectangularSection
+from fabric_fenicsx.mechanics.shear_friction import CoulombFriction, DahlFriction, SlidingFriction
 from fabric_fenicsx.mechanics.shear_laws import (
-    CoulombFriction,
     Crossing,
-    DahlFriction,
+    EyringDashpot,
     LinearDashpot,
     Locking,
     Maxwell,
     PolynomialSpring,
     PowerDashpot,
+    SmoothLocking,
     TabulatedDashpot,
     TabulatedSpring,
 )
@@ -107,6 +108,31 @@ def test_power_dashpot(power):
     """C |γ̇|^p sign γ̇ at rates of 0.1 and −0.3 rad/s, the floor of 1e-5 being 1e-8 of it."""
     M = moments(PowerDashpot(5.0, power), [0.1, -0.2])
     assert M == pytest.approx([5.0 * 0.1**power, -5.0 * 0.3**power], rel=1e-7)
+
+
+def test_eyring_dashpot():
+    """C asinh(γ̇/v), odd, at rates of 1e-6 to 1e4 times v."""
+    rates = np.array([1e-6, 0.01, 1.0, 100.0, 1e4])
+    for sign in (1.0, -1.0):
+        M = [moments(EyringDashpot(5.0, 0.02), [sign * 0.02 * r])[0] for r in rates]
+        assert M == pytest.approx(sign * 5.0 * np.arcsinh(rates), rel=1e-9)
+
+
+def test_sliding_friction_grows_with_the_angle():
+    """M_c (1 + a |γ|) against the motion, whichever side it is on."""
+    M = moments(SlidingFriction(2.0, growth=3.0), [0.4, 0.1, -0.5, -0.5])
+    assert M == pytest.approx([2.0 * 2.2, -2.0 * 1.3, -2.0 * 2.5, 0.0])
+
+
+def test_smooth_locking():
+    """Odd; its slope is k/(1 + e^(−(|γ| − γ_L)/w)), half of k at γ_L, and nothing is there at 0."""
+    law = SmoothLocking(0.6, 40.0, 0.05)
+    gammas = np.linspace(0.0, 1.0, 2001)
+    M = moments(law, gammas)
+    slope = 40.0 / (1.0 + np.exp(-(gammas - 0.6) / 0.05))
+    assert np.gradient(M, gammas)[1:-1] == pytest.approx(slope[1:-1], rel=1e-4, abs=1e-6)
+    assert M[0] == 0.0
+    assert moments(law, -gammas[::100]) == pytest.approx(-M[::100])
 
 
 def test_tabulated_dashpot():

@@ -47,6 +47,7 @@ class Parameter:
             cantilever "curvature" or "moment", the largest of them in the fitted baseline.
         jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
             for on both sides.
+        run: the run, counted from 0, that it alone belongs to.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Parameter:
     meaning: str = ""
     share_of: str = ""
     jumps: bool = False
+    run: int | None = None
 
     @property
     def one_sided(self) -> bool:

@@ -261,8 +261,10 @@ class PictureFrame:
         def expanded(v: Variant) -> Variant:
             if not (isinstance(v, FrameVariant) and v.each_run):
                 return v
-            own = tuple(replace(p, name=_of_run(p, run)) for run in runs for p in v.parameters)
-            return replace(v, parameters=own)
+            own = ((p, int(run)) for run in runs for p in v.parameters)
+            return replace(
+                v, parameters=tuple(replace(p, name=_of_run(p, run), run=run) for p, run in own)
+            )
 
         each = [v for v in effect.variants if getattr(v, "each_run", False)]
         shared = [v for v in effect.variants if v not in each]
@@ -276,7 +278,7 @@ class PictureFrame:
     def _each_run(
         self, variant: FrameVariant, values: Mapping[str, float], force: Array
     ) -> Varying:
-        """What the load cell adds; of a holdout run, what fits best to what is left there."""
+        """What the load cell adds; in a run that is not fitted, what fits best to what is left."""
         assert variant.reading is not None
         names = dict.fromkeys(p.name.split("_", 1)[1] for p in variant.parameters)
         unit = Marched(("time",), tuple(names))

@@ -6,19 +6,21 @@ amplitude.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
-from ufl import as_ufl, conditional, gt, max_value, min_value
+from ufl import max_value, min_value
 
+from ..mechanics.shear_friction import CoulombFriction, DahlFriction, SlidingFriction
 from ..mechanics.shear_laws import (
-    CoulombFriction,
-    DahlFriction,
     EvenSpring,
     ExponentialLocking,
+    EyringDashpot,
     Locking,
     Maxwell,
     PowerDashpot,
-    SlidingFriction,
+    SmoothLocking,
 )
 from .effects import Effect, FrameVariant, Parameter, Values
 
@@ -52,7 +54,7 @@ TRAVEL = Parameter(
     0.0,
     0.3,
     amplitude=True,
-    meaning="crosshead travel before engagement",
+    meaning="crosshead travel before the first engagement; symmetric play turns in twice that",
     share_of="travel",
     jumps=True,
 )
@@ -67,14 +69,20 @@ def _dead_zone(p: Values, D: Any, past: Any) -> Any:
     return max_value(D - free, 0) + min_value(D + free, 0)
 
 
-def _play(p: Values, D: Any, past: Any) -> Any:
-    free = p["free_travel_mm"]
-    return min_value(max_value(past, D - free), D + free)
+def _play(behind: float, ahead: float) -> Callable[[Values, Any, Any], Any]:
+    """The frame stays where it is until the crosshead has left it behind or come up from ahead.
 
+    Args:
+        behind: free travel on the way out, over the parameter.
+        ahead: on the way back.
+    """
 
-def _half_play(p: Values, D: Any, past: Any) -> Any:
-    """Engaged from behind at the start: free travel on the way out, then again at each turn."""
-    return min_value(max_value(past, D - p["free_travel_mm"]), conditional(gt(D, 0), D, as_ufl(0)))
+    def travel(p: Values, D: Any, past: Any) -> Any:
+        free = p["free_travel_mm"]
+        # Where both sides touch, at rest, the derivative is that of the second.
+        return min_value(D + ahead * free, max_value(past, D - behind * free))
+
+    return travel
 
 
 def _locking(power: int) -> FrameVariant:
@@ -136,6 +144,30 @@ PICTURE_FRAME_EFFECTS = (
                 (LIMIT, SLIP),
                 laws=lambda p: (DahlFriction(p["m_c_N"], p["m_c_N"] / p["slip_angle_rad"]),),
             ),
+            FrameVariant(
+                "sliding, growing with the angle",
+                (
+                    LIMIT,
+                    ROUNDING,
+                    Parameter("growth_1_rad", (1.0,), 0.0, 50.0, meaning="of m_c, with the angle"),
+                ),
+                laws=lambda p: (
+                    SlidingFriction(p["m_c_N"], p["rounding_rad_s"], p["growth_1_rad"]),
+                ),
+            ),
+            FrameVariant(
+                "two sliders",
+                (
+                    replace(LIMIT, name="m_c1_N"),
+                    replace(SLIP, name="slip_angle1_rad", starts=(0.003, 0.015)),
+                    replace(LIMIT, name="m_c2_N"),
+                    replace(SLIP, name="slip_angle2_rad", starts=(0.05, 0.15)),
+                ),
+                laws=lambda p: (
+                    CoulombFriction(p["m_c1_N"], p["m_c1_N"] / p["slip_angle1_rad"]),
+                    CoulombFriction(p["m_c2_N"], p["m_c2_N"] / p["slip_angle2_rad"]),
+                ),
+            ),
         ),
     ),
     Effect(
@@ -182,6 +214,21 @@ PICTURE_FRAME_EFFECTS = (
                 ),
                 laws=lambda p: (PowerDashpot(p["c_n_N_s_n"], p["n"], floor=1e-7),),
             ),
+            FrameVariant(
+                "Eyring",
+                (
+                    Parameter("c_N", lower=0.0, amplitude=True, meaning="moment per e of the rate"),
+                    Parameter(
+                        "rate_rad_s",
+                        (1e-3, 0.03, 0.3),
+                        1e-4,
+                        3.0,
+                        meaning="rate about which the moment bends over",
+                        share_of="rate",
+                    ),
+                ),
+                laws=lambda p: (EyringDashpot(p["c_N"], p["rate_rad_s"]),),
+            ),
         ),
     ),
     Effect(
@@ -192,6 +239,25 @@ PICTURE_FRAME_EFFECTS = (
             _locking(1),
             _locking(2),
             _locking(3),
+            FrameVariant(
+                "smooth",
+                (
+                    Parameter(
+                        "k_lock_N", lower=0.0, amplitude=True, meaning="stiffness beyond locking"
+                    ),
+                    LOCKING_ANGLE,
+                    Parameter(
+                        "locking_width_rad",
+                        (0.03,),
+                        0.003,
+                        0.3,
+                        meaning="angle over which locking sets in",
+                    ),
+                ),
+                laws=lambda p: (
+                    SmoothLocking(p["locking_angle_rad"], p["k_lock_N"], p["locking_width_rad"]),
+                ),
+            ),
             FrameVariant(
                 "exponential",
                 (
@@ -226,9 +292,12 @@ PICTURE_FRAME_EFFECTS = (
         (
             FrameVariant("free on the way out", (TRAVEL,), travel=_slack),
             FrameVariant("free on both sides", (TRAVEL,), travel=_dead_zone),
-            FrameVariant("play", (TRAVEL,), travel=_play, remembers_travel=True),
+            FrameVariant("play", (TRAVEL,), travel=_play(1.0, 1.0), remembers_travel=True),
             FrameVariant(
-                "play, engaged at rest", (TRAVEL,), travel=_half_play, remembers_travel=True
+                "play on the way out", (TRAVEL,), travel=_play(1.0, 0.0), remembers_travel=True
+            ),
+            FrameVariant(
+                "play on the way back", (TRAVEL,), travel=_play(0.0, 1.0), remembers_travel=True
             ),
         ),
     ),

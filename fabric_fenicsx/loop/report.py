@@ -22,6 +22,7 @@ from .diagnosis import Diagnosis
 from .effects import Effect, Parameter, Variant
 from .fitting import Fit, parameters_of
 from .measurement import Measurement
+from .search import STATED
 
 __all__ = ["SCHEMA", "combined_report", "headline", "parameter_unit", "test_report", "write_report"]
 
@@ -76,7 +77,7 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
             }
             for c in d.candidates
         ],
-        "baseline": {"parameters": d.baseline.values, "std": d.baseline.errors_at(noise)},
+        "baseline": {"parameters": d.baseline.values, "std": _std(d, d.baseline)},
         "error": {
             "quantity": d.experiment.quantity,
             "before": {"fit": d.baseline.rms(rows), "holdout": d.holdout_before},
@@ -165,10 +166,14 @@ def headline(report: Mapping[str, Any]) -> str:
             if effect["rivals"]:
                 text += f" This data cannot tell {effect['name']} from {one_of(effect['rivals'])}."
         return text
-    text = (
-        "The residual is not noise, and no known effect explains it, nor does a pair of them: "
-        f"held-out error {before}; {scatter}."
-    )
+    nor = "and no known effect explains it, nor does a pair of them"
+    text = f"The residual is not noise, {nor}: held-out error {before}; {scatter}."
+    fitted = error["before"]["fit"]
+    if fitted is not None and fitted <= STATED * error["noise"]:
+        text = (
+            "The fitted readings are what the baseline says within their noise, the held-out ones "
+            f"are not, {nor}: error {value(fitted)} and {before}; {scatter}."
+        )
     best = report["best"]
     if best is not None and best["effects"]:
         names = " and ".join(effect["name"] for effect in best["effects"])
@@ -183,7 +188,7 @@ def _effect(d: Diagnosis, effect: Effect) -> dict[str, Any]:
 
 
 def _form(d: Diagnosis, model: Fit, effect: Effect, variant: Variant) -> dict[str, Any]:
-    std = model.errors_at(d.noise)
+    std = _std(d, model)
     names = [p.name for p in variant.parameters]
     return {
         "name": effect.name,
@@ -191,6 +196,14 @@ def _form(d: Diagnosis, model: Fit, effect: Effect, variant: Variant) -> dict[st
         "std": {name: std[name] for name in names},
         "variant": variant.label,
         "meaning": effect.meaning,
+    }
+
+
+def _std(d: Diagnosis, model: Fit) -> dict[str, float | None]:
+    """Standard errors; None of a parameter on a bound, where there is none."""
+    return {
+        name: None if name in model.at_bound else value
+        for name, value in model.errors_at(d.noise).items()
     }
 
 
@@ -209,7 +222,7 @@ def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
     return {
         "effects": forms,
         "parameters": model.values,
-        "std": model.errors_at(d.noise),
+        "std": _std(d, model),
         "error_fit": model.rms(d.baseline.used),
         "error_holdout": holdout,
     }

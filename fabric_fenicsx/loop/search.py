@@ -12,6 +12,7 @@ What is accepted must leave noise in the fitted readings and bring the held-out 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -20,9 +21,9 @@ from scipy.stats import chi2
 
 from ..errors import SolveError
 from .diagnosis import Candidate, Diagnosis, Verdict
-from .effects import Effect
+from .effects import Effect, Variant
 from .experiment import Experiment
-from .fitting import Fit, fit, soft_size, without
+from .fitting import Fit, fit, parameters_of, soft_size, without
 from .noise import Whiteness, estimated_noise, lone, spikes, whiteness
 from .scores import score_tests
 from .starts import fit_from_grid
@@ -60,6 +61,11 @@ READ = 0.005
 ROUNDS = 3
 #: Forms of an effect, the best ones, that are fitted again when readings have been left out.
 KEPT = 3
+#: Said where a run has parameters of its own.
+OWN_ZERO = (
+    "A load cell's zero, and its drift, of each run: in a run that is not fitted they are taken "
+    "from its own readings, so that its error tests the shape of the force, not where it begins."
+)
 #: Effects at most: any three of them would fit almost anything.
 MOST = 2
 #: Effects whose pairs with every other are tried where no single one explains the data.
@@ -114,19 +120,23 @@ class _Search:
         return np.asarray(self.readings.fit & ~self.outliers)
 
     def _leave_out(self, model: Fit) -> bool:
-        """Leave out what stands out from a model's residual; whether that was anything new."""
-        rows = self.readings.usable & ~self.outliers
+        """Leave out what stands out from a model's residual, and only that; whether it is other.
+
+        What stood out from a lesser model may be just what the better one explains.
+        """
+        rows = self.readings.usable
         found = spikes(model.residual, self.readings, rows)
         found |= lone(model.residual, self.readings, rows & ~found)
-        if found.any():
-            self.outliers = self.outliers | found
+        changed = bool((found != self.outliers).any())
+        if changed:
+            self.outliers = found
             self.baseline = fit(self.experiment, (), self.baseline.values, self.rows)
         if self.rows.sum() <= len(self.baseline.values):
             raise SolveError(
                 f"the baseline has {len(self.baseline.values)} parameters "
                 f"and there are {int(self.rows.sum())} readings to fit"
             )
-        return bool(found.any())
+        return changed
 
     def run(self) -> Diagnosis:
         """See diagnose_test."""
@@ -145,13 +155,17 @@ class _Search:
         quiet = explained and silent
         if not silent:
             nearest, explained = self._choose(singles)
-            if not explained and self._leave_out(nearest[0]):
+            if self._leave_out(nearest[0]):
                 candidates, singles = self._tried(again=True)
-                nearest, explained = self._choose(singles)
+                if explained:
+                    nearest = (self._fitted_again([nearest[0]])[0], nearest[1])
+                else:
+                    nearest, explained = self._choose(singles)
             if self._explains(self.baseline) and not self._foretells(nearest, candidates):
                 nearest, quiet = (self.baseline, ()), True
         for candidate in candidates:
             if candidate.fit is not None:
+                candidate.fit = self._least_squares(candidate.fit)
                 candidate.holdout = self._holdout(candidate.fit)
         baseline = self.baseline
         verdict: Verdict = "effect_found" if explained else "unexplained"
@@ -181,7 +195,7 @@ class _Search:
             white_before=self._whiteness(baseline),
             white_after=self._whiteness(chosen),
             outliers=self.outliers,
-            notes=list(self.experiment.notes),
+            notes=[*self.experiment.notes, *([OWN_ZERO] if _has_own(chosen.variants) else [])],
         )
 
     def _tried(self, again: bool = False) -> tuple[list[Candidate], list[Candidate]]:
@@ -322,6 +336,19 @@ class _Search:
                 found[k] = (again, effects)
         return found
 
+    def _least_squares(self, model: Fit) -> Fit:
+        """A fit in which no reading counts less: no worse, by the squares, than the baseline."""
+        own = parameters_of(self.experiment, model.variants)
+        nothing = {p.name: 0.0 for p in own if p.amplitude}
+        for start in (model.values, model.values | self.baseline.values | nothing):
+            try:
+                found = fit(self.experiment, model.variants, start, self.rows)
+            except SolveError:
+                continue
+            if found.sum_of_squares <= self.baseline.sum_of_squares:
+                return found
+        return model
+
     # Judgement ----------------------------------------------------------------------------
 
     def _noise_of(self, model: Fit) -> float:
@@ -427,8 +454,9 @@ class _Search:
             rest = self.rows & ~part
             if rest.sum() <= len(model.values) or not part.any():
                 continue
+            variants = _within(model.variants, self.readings.run[rest])
             try:
-                again = fit(self.experiment, model.variants, model.values, rest, evaluations=25)
+                again = fit(self.experiment, variants, model.values, rest, evaluations=25)
             except SolveError:
                 continue
             total += float(np.sum((again.residual * again.weight)[part] ** 2))
@@ -456,6 +484,20 @@ class _Search:
                 if instead is not None and self._criterion(instead, self._near) < limit:
                     found[own.name].append(other.effect.name)
         return found
+
+
+def _has_own(variants: Sequence[Variant]) -> bool:
+    return any(p.run is not None for v in variants for p in v.parameters)
+
+
+def _within(variants: Sequence[Variant], runs: npt.NDArray[np.int64]) -> tuple[Variant, ...]:
+    """The same without the parameters of other runs."""
+    return tuple(
+        replace(v, parameters=tuple(p for p in v.parameters if p.run is None or p.run in runs))
+        if _has_own([v])
+        else v
+        for v in variants
+    )
 
 
 def _upper(freedom: int) -> float:

@@ -1,4 +1,6 @@
-"""In-plane moments between warp and weft, pieces that add: springs, dashpots, friction, locking.
+"""In-plane moments between warp and weft, pieces that add: springs, dashpots, locking.
+
+Friction is in shear_friction, tows that touch side by side in compaction.
 
 Each law is a small frozen object with a ``moment``: an expression in the shear angle γ at the end
 of the step, its value γ_n at the start, Δt and, if the law remembers, history values per crossing.
@@ -15,21 +17,20 @@ from itertools import pairwise
 from typing import Any, Protocol
 
 from scipy.interpolate import PchipInterpolator
-from ufl import conditional, exp, ge, lt, max_value, min_value, tanh
+from ufl import conditional, exp, ge, ln, lt, max_value, sqrt
 
 __all__ = [
-    "CoulombFriction",
     "Crossing",
-    "DahlFriction",
     "EvenSpring",
     "ExponentialLocking",
+    "EyringDashpot",
     "LinearDashpot",
     "Locking",
     "Maxwell",
     "PolynomialSpring",
     "PowerDashpot",
     "ShearLaw",
-    "SlidingFriction",
+    "SmoothLocking",
     "TabulatedDashpot",
     "TabulatedSpring",
 ]
@@ -176,6 +177,30 @@ class PowerDashpot:
 
 
 @dataclass(frozen=True, slots=True)
+class EyringDashpot:
+    """M = c asinh(γ̇/v): linear at slow rates, then slower and slower (Eyring's thermal activation).
+
+    Attributes:
+        c: [N mm].
+        rate: v [rad/s], about which it bends over.
+    """
+
+    c: float
+    rate: float
+    name: str = "Eyring dashpot"
+
+    def moment(self, at: Crossing) -> Any:
+        """Asinh x = ln(x + √(x² + 1)) of |x|, with the sign of the rate."""
+        x = at.rate / at.number(self.rate)
+        size = at.number(self.c) * ln(_size(x) + sqrt(x**2 + 1))
+        return conditional(ge(x, 0), size, -size)
+
+    def history(self, at: Crossing) -> dict[str, Any]:
+        """None."""
+        return {}
+
+
+@dataclass(frozen=True, slots=True)
 class TabulatedDashpot:
     """M(γ̇) through points as for TabulatedSpring (the form in which the paper gives its dashpot).
 
@@ -229,80 +254,6 @@ class Maxwell:
         decay = exp(-1 / (tau * at.per_time))
         cubic = at.number(self.cubic) * (at.gamma**3 - at.gamma_n**3)
         return at.past("angle") * decay + (at.change + cubic) * at.per_time * tau * (1 - decay)
-
-
-@dataclass(frozen=True, slots=True)
-class CoulombFriction:
-    """Elastic up to a limit, then sliding: the moment never exceeds m_c.
-
-    Attributes:
-        limit: m_c [N mm].
-        stiffness: of the stick, dM/dγ [N mm].
-    """
-
-    limit: float
-    stiffness: float
-    name: str = "Coulomb friction"
-
-    def moment(self, at: Crossing) -> Any:
-        """Return mapping: the trial moment, cut at the limits."""
-        trial = at.past("moment") + at.number(self.stiffness) * at.change
-        limit = at.number(self.limit)
-        return max_value(min_value(trial, limit), -limit)
-
-    def history(self, at: Crossing) -> dict[str, Any]:
-        """The moment itself."""
-        return {"moment": self.moment(at)}
-
-
-@dataclass(frozen=True, slots=True)
-class DahlFriction:
-    """Dahl's smooth friction: dM/dγ = σ (1 − M sign(γ̇)/m_c), solved exactly over a step.
-
-    Attributes:
-        limit: m_c [N mm].
-        stiffness: σ at reversal of a relaxed contact [N mm].
-    """
-
-    limit: float
-    stiffness: float
-    name: str = "Dahl friction"
-
-    def moment(self, at: Crossing) -> Any:
-        """±m_c + (M_n ∓ m_c) exp(−σ |Δγ| / m_c)."""
-        limit = at.number(self.limit)
-        step = at.change * at.number(self.stiffness) / limit
-        past = at.past("moment")
-        forth = limit + (past - limit) * exp(-max_value(step, 0))
-        back = -limit + (past + limit) * exp(min_value(step, 0))
-        return conditional(ge(step, 0), forth, back)
-
-    def history(self, at: Crossing) -> dict[str, Any]:
-        """The moment itself."""
-        return {"moment": self.moment(at)}
-
-
-@dataclass(frozen=True, slots=True)
-class SlidingFriction:
-    """M = m_c tanh(γ̇/v): Coulomb friction that does not stick, so that a hold has none.
-
-    Attributes:
-        limit: m_c [N mm].
-        floor: v [rad/s], well below the rates of interest.
-    """
-
-    limit: float
-    floor: float = 1e-5
-    name: str = "sliding friction"
-
-    def moment(self, at: Crossing) -> Any:
-        """The rounded sign of the rate, cut off where round-off has made it one."""
-        sign = max_value(min_value(at.rate / at.number(self.floor), 20), -20)
-        return at.number(self.limit) * tanh(sign)
-
-    def history(self, at: Crossing) -> dict[str, Any]:
-        """None."""
-        return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,6 +325,33 @@ class ExponentialLocking:
         """Zero below γ_L."""
         past_it = max_value(_size(at.gamma) - at.number(self.angle), 0)
         beyond = at.number(self.moment_scale) * (exp(past_it / at.number(self.scale)) - 1)
+        return conditional(ge(at.gamma, 0), beyond, -beyond)
+
+    def history(self, at: Crossing) -> dict[str, Any]:
+        """None."""
+        return {}
+
+
+@dataclass(frozen=True, slots=True)
+class SmoothLocking:
+    """Locking that sets in over a width: M = k w (f(|γ| − γ_L) − f(−γ_L)), f(x) = ln(1 + e^(x/w)).
+
+    Attributes:
+        angle: γ_L [rad].
+        stiffness: k [N mm], dM/dγ well beyond γ_L.
+        width: w [rad].
+    """
+
+    angle: float
+    stiffness: float
+    width: float
+    name: str = "smooth locking"
+
+    def moment(self, at: Crossing) -> Any:
+        """The integral of a slope that goes from 0 to k about γ_L."""
+        angle, width = at.number(self.angle), at.number(self.width)
+        past_it = ln(1 + exp((_size(at.gamma) - angle) / width)) - ln(1 + exp(-angle / width))
+        beyond = at.number(self.stiffness) * width * past_it
         return conditional(ge(at.gamma, 0), beyond, -beyond)
 
     def history(self, at: Crossing) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Shear laws in a case file: one group of keys for each of mechanics.shear_laws.
+"""Shear laws in a case file: one group of keys for each law of a crossing.
 
 Moments are per area of fabric, as everywhere in a case; angles in degrees.
 """
@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ..mechanics import compaction, shear_laws
+from ..mechanics import compaction, shear_friction, shear_laws
 from .groups import Keys, NotNegative, Positive
 
 __all__ = ["ShearLawKeys"]
@@ -88,8 +88,8 @@ class FrictionKeys(Keys):
         limit = self.limit_N_mm * area
         stiffness = limit / math.radians(self.stick_angle_deg)
         if self.law == "coulomb_friction":
-            return shear_laws.CoulombFriction(limit, stiffness)
-        return shear_laws.DahlFriction(limit, stiffness)
+            return shear_friction.CoulombFriction(limit, stiffness)
+        return shear_friction.DahlFriction(limit, stiffness)
 
 
 class LockingKeys(Keys):
