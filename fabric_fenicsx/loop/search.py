@@ -158,7 +158,8 @@ class _Search:
             if self._leave_out(nearest[0]):
                 candidates, singles = self._tried(again=True)
                 if explained:
-                    nearest = (self._fitted_again([nearest[0]])[0], nearest[1])
+                    again = self._fitted_again([nearest[0]])
+                    nearest = (again[0], nearest[1]) if again else nearest
                 else:
                     nearest, explained = self._choose(singles)
             if self._explains(self.baseline) and not self._foretells(nearest, candidates):
@@ -268,16 +269,18 @@ class _Search:
         ones: list[Model] = [(c.fit, (c.effect,)) for c in singles if c.fit is not None]
         if not ones:
             return (self.baseline, ()), False
-        forms = [(f, (self.effects[k],)) for k, found in self._forms.items() for f in found]
+        forms: list[Model] = [
+            (f, (self.effects[k],)) for k, found in self._forms.items() for f in found
+        ]
         single, explained = self._first_that_explains(ones, forms)
         # Only where the residual still shows structure, or a prediction leans on how uncertain it
         # is, is a second effect looked for.
         if explained and not self._whiteness(single[0]).structured and self._foresees(single[0]):
             return single, True
-        pairs = self._pairs(singles)
+        pairs, forms = self._pairs(singles)
         if not pairs:
             return single, explained
-        pair, both_explain = self._first_that_explains(pairs)
+        pair, both_explain = self._first_that_explains(pairs, forms)
         gain = self._criterion(single[0]) - self._criterion(pair[0])
         if not explained:
             return (pair, both_explain) if gain > DECISIVE else (single, False)
@@ -293,7 +296,7 @@ class _Search:
         """Of those that fit all but equally well, the best in cross-validation that explains.
 
         Args:
-            models: of each effect, or pair of effects, the form that fits best.
+            models: of each effect, or pair of effects, the forms that fit best.
             forms: all that were fitted; asked where the best ones do not predict what was held
                 out, and these fit as well.
         """
@@ -309,32 +312,46 @@ class _Search:
             other = [m for m in forms if self._criterion(m[0]) < best + DECISIVE]
             other.sort(key=lambda m: self._criterion(m[0]))
             explaining += [model for model in other if self._explains(model[0])]
-        # Of those that fit alike, one whose prediction needs no excuse.
-        explaining.sort(key=lambda model: not self._foresees(model[0]))
+        # Of those that fit alike, one whose prediction needs no excuse, or the least.
+        explaining.sort(key=lambda model: self._excess(model[0]))
         return (explaining[0], True) if explaining else (near[0], False)
 
-    def _pairs(self, singles: list[Candidate]) -> list[Model]:
-        """The first few effects with each of the others, the stronger first."""
+    def _pairs(self, singles: list[Candidate]) -> tuple[list[Model], list[Model]]:
+        """The first few effects with each of the others, the stronger first.
+
+        Returns:
+            Each pair in the forms that fit best, and in all forms that were fitted.
+        """
         found: list[Model] = []
+        forms: list[Model] = []
         pairs = [(a, b) for a, b in combinations(singles, MOST) if singles.index(a) < FIRST]
         for k, (a, b) in enumerate(pairs):
             self.progress(0.6 + 0.3 * k / len(pairs), f"fit {a.effect.name}, {b.effect.name}")
-            if a.fit is None:
-                continue
-            both = self._best_variant(a.fit, b.effect)
-            if both is not None:
-                found.append((both, (a.effect, b.effect)))
+            if a.fit is not None:
+                self._best_of(found, forms, self._forms_of(a.fit, b.effect), (a.effect, b.effect))
         # The form of the first was chosen without the second: now with it.
         found.sort(key=lambda pair: self._criterion(pair[0]))
-        for k, (both, effects) in enumerate(found[:FIRST]):
+        for both, effects in found[:FIRST]:
             try:
                 rest = without(self.experiment, both, effects[0].variants)
             except SolveError:
                 continue
-            again = self._best_variant(rest, effects[0])
-            if again is not None and self._criterion(again) < self._criterion(both):
-                found[k] = (again, effects)
-        return found
+            self._best_of(found, forms, self._forms_of(rest, effects[0]), effects)
+        return found, forms
+
+    def _best_of(
+        self, found: list[Model], forms: list[Model], fits: list[Fit], effects: tuple[Effect, ...]
+    ) -> None:
+        """Add fits of a pair to all forms, and the best of them in the place of one not as good."""
+        forms += [(model, effects) for model in fits]
+        known = [k for k, pair in enumerate(found) if pair[1] == effects]
+        best = min(fits, key=self._criterion, default=None)
+        if best is None:
+            return
+        if not known:
+            found.append((best, effects))
+        elif self._criterion(best) < self._criterion(found[known[0]][0]):
+            found[known[0]] = (best, effects)
 
     def _least_squares(self, model: Fit) -> Fit:
         """A fit in which no reading counts less: no worse, by the squares, than the baseline."""
@@ -394,8 +411,12 @@ class _Search:
 
     def _foresees(self, model: Fit) -> bool:
         """Whether a model predicts what was held out, as if its parameters were exact."""
+        return self._excess(model) == 0.0
+
+    def _excess(self, model: Fit) -> float:
+        """Held-out error beyond that of a right model with exact parameters."""
         out = self._held_rows()
-        return not out.any() or model.rms(out) <= self._limit(out)
+        return max(model.rms(out) - self._limit(out), 0.0) if out.any() else 0.0
 
     def _limit(self, out: Flags, least: float = NEAR) -> float:
         return self._near * max(least, _upper(int(out.sum())))
@@ -478,12 +499,18 @@ class _Search:
                 if len(effects) == 1:
                     instead = other.fit
                 else:
-                    kept = next(e for e in effects if e is not own)
-                    base = next(c.fit for c in singles if c.effect is kept)
-                    instead = self._best_variant(base, other.effect) if base else None
+                    instead = self._instead(chosen, own, other.effect)
                 if instead is not None and self._criterion(instead, self._near) < limit:
                     found[own.name].append(other.effect.name)
         return found
+
+    def _instead(self, chosen: Fit, own: Effect, other: Effect) -> Fit | None:
+        """A model of two effects with another one in the place of one of them."""
+        try:
+            base = without(self.experiment, chosen, own.variants)
+        except SolveError:
+            return None
+        return self._best_variant(base, other)
 
 
 def _has_own(variants: Sequence[Variant]) -> bool:
