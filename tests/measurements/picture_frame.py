@@ -78,9 +78,12 @@ def motions(test: Experiment, effects: list[Effect]) -> list[tuple[Motion, np.nd
     """Motion of each run on a grid that holds its readings, and the readings' places in it."""
     result = []
     for run, (programme, times) in enumerate(zip(test.programmes, test.times, strict=True)):
-        others = np.append(np.linspace(0, programme.duration, 3001), programme.corners)
+        last, fine = programme.duration, np.linspace(0, programme.duration, 3001)
+        # Just after each reading, before the last: whether the frame rests is told at once there.
+        beside = np.append(times[:-1] + 1e-7 * last, times[-1] - 1e-7 * last)
+        others = np.concatenate([fine, programme.corners, beside])
         # Two points of the grid that are one but for round-off would look like a rest.
-        near = np.abs(others[:, None] - times).min(axis=1) < 1e-9 * programme.duration
+        near = np.abs(others[:, None] - times).min(axis=1) < 1e-9 * last
         grid = np.unique(np.concatenate([others[~near], times]))
         displacement, speed = programme.drive(test.frame, grid)
         travel = displacement
