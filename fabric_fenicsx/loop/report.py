@@ -21,8 +21,8 @@ from .advice import further_test
 from .diagnosis import Diagnosis
 from .effects import Effect, Parameter, Variant
 from .fitting import Fit, parameters_of
+from .judge import STATED
 from .measurement import Measurement
-from .search import STATED
 
 __all__ = ["SCHEMA", "combined_report", "headline", "parameter_unit", "test_report", "write_report"]
 
