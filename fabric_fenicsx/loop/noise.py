@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from .experiment import Readings
 
-__all__ = ["Whiteness", "estimated_noise", "lone", "spikes", "whiteness"]
+__all__ = ["LIMIT", "Whiteness", "estimated_noise", "lone", "spikes", "whiteness"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]

@@ -250,7 +250,7 @@ PICTURE_FRAME_EFFECTS = (
                         "locking_width_rad",
                         (0.03,),
                         0.003,
-                        0.3,
+                        0.06,
                         meaning="angle over which locking sets in",
                     ),
                 ),

@@ -20,6 +20,7 @@ from .effects import Effect
 from .experiment import Experiment
 from .fitting import Fit, fit, parameters_of, without
 from .judge import FAR, Judge, has_own
+from .noise import LIMIT
 from .scores import score_tests
 from .starts import fit_from_grid
 
@@ -109,8 +110,9 @@ class _Search:
         return self.judge.explains(model, self.baseline)
 
     def _settled(self, model: Fit) -> bool:
-        """Whether a model leaves neither structure nor an error in what was held out."""
-        return not self.judge.whiteness(model).structured and self.judge.foresees(model)
+        """Whether a model leaves noise alone, and foresees what was held out."""
+        white = self.judge.whiteness(model)
+        return not white.structured and white.size > LIMIT and self.judge.foresees(model)
 
     def _foretells(self, model: Model, candidates: list[Candidate]) -> bool:
         """Whether a model predicts parts of the fitted readings better than the baseline does."""
@@ -247,13 +249,9 @@ class _Search:
             (f, (self.effects[k],)) for k, found in self._forms.items() for f in found
         ]
         single, explained = self._first_that_explains(ones, forms)
-        # Only where the residual still shows structure, or a prediction leans on how uncertain it
-        # is, is a second effect looked for.
-        if (
-            explained
-            and not self.judge.whiteness(single[0]).structured
-            and self.judge.foresees(single[0])
-        ):
+        # Only where something is left, or a prediction leans on how uncertain it is, is a second
+        # effect looked for.
+        if explained and self._settled(single[0]):
             return single, True
         pairs, forms = self._pairs(singles)
         if not pairs:

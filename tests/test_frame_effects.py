@@ -1,0 +1,111 @@
+"""Effects that single readings carry, and those of each run: closed forms, diagnosed.
+
+A crosshead goes to and fro at a constant speed between 0 and 60 mm; the frame follows it with play,
+and the force is that of k1 γ + k3 γ³ + c1 γ̇ with the frame's own γ. In the gap the frame rests, so
+that the readings just after a turn miss the dashpot's force.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fabric_fenicsx.loop.measurement import FabricKeys, Measurement, PictureFrameRig, Run
+from fabric_fenicsx.loop.picture_frame import PictureFrame
+from fabric_fenicsx.loop.search import diagnose_test
+
+LENGTH, FABRIC, TRAVEL, SIGMA = 192.0, 96.0, 60.0, 0.02
+K1, K3, C1 = 0.05, 0.2, 1.5
+SPEEDS = (0.6, 2.0, 6.0)
+COUNT = 160
+
+
+def force(D, speed):
+    """Crosshead force [N] of a frame at D [mm] that moves at a speed [mm/s]."""
+    theta = np.arccos((D / LENGTH + np.sqrt(2.0)) / 2.0)
+    gamma = np.pi / 2.0 - 2.0 * theta
+    lever = LENGTH * np.sin(theta)
+    m = K1 * gamma + K3 * gamma**3 + C1 * speed / lever
+    return m * FABRIC**2 / lever
+
+
+def followed(D, behind, ahead):
+    """Where a frame is that trails by up to ``behind`` and runs ahead by up to ``ahead`` [mm]."""
+    x = np.zeros_like(D)
+    for i in range(1, len(D)):
+        x[i] = min(max(x[i - 1], D[i] - behind), D[i] + ahead)
+    return x
+
+
+def measured(follow=lambda D: D, added=lambda run, t: 0.0, spoil=(), noise=SIGMA):
+    """Three runs of two cycles, the middle one held out, as a folder would be read."""
+    rng = np.random.default_rng(11)
+    runs = []
+    for number, speed in enumerate(SPEEDS):
+        t = np.linspace(0.0, 4.0 * TRAVEL / speed, COUNT + 1)[:-1]
+        near = t[:, None] + [0.0, 1e-6 * t[-1]]
+        D = TRAVEL * (1.0 - np.abs(1.0 - near * speed / TRAVEL % 2.0))
+        # Beside each reading the next moment: its speed.
+        order = np.argsort(near, axis=None)
+        x = np.zeros(2 * COUNT)
+        x[order] = follow(D.ravel()[order])
+        x = x.reshape(D.shape)
+        F = force(x[:, 0], (x[:, 1] - x[:, 0]) / (near[:, 1] - near[:, 0])) + added(number, t)
+        F += rng.normal(0.0, SIGMA, COUNT)
+        F[list(spoil)] += 40.0 * SIGMA
+        columns = {"time_s": t, "displacement_mm": D[:, 0], "force_N": F}
+        runs.append(Run(f"{number}.csv", number == 1, "", columns))
+    fabric = FabricKeys(areal_density_kg_m2=0.2)
+    rig = PictureFrameRig(frame_length_mm=LENGTH, fabric_length_mm=FABRIC)
+    return Measurement(Path("frame"), "picture_frame", "", fabric, rig, noise, tuple(runs))
+
+
+def diagnosed(**how):
+    return diagnose_test(PictureFrame([measured(**how)]))
+
+
+@pytest.mark.parametrize(
+    ("form", "behind", "ahead"),
+    [("play", 0.5, 0.5), ("play on the way out", 1.0, 0.0), ("play on the way back", 0.0, 1.0)],
+)
+def test_play_is_found_by_what_happens_at_the_turns(form, behind, ahead):
+    found = diagnosed(follow=lambda D: followed(D, behind, ahead))
+    assert [e.name for e in found.effects] == ["crosshead_backlash"]
+    assert found.final.variants[0].label == form
+    travel = found.final.values["free_travel_mm"]
+    assert travel == pytest.approx(max(behind, ahead), abs=0.1)
+    assert found.holdout_after < 1.15 * SIGMA
+    # Without the play just these stand out as spikes would.
+    assert not found.outliers.any()
+
+
+def test_spikes_are_left_out_beside_play():
+    spoil = (37, 112)
+    found = diagnosed(follow=lambda D: followed(D, 1.0, 0.0), spoil=spoil)
+    assert [e.name for e in found.effects] == ["crosshead_backlash"]
+    expected = [COUNT * run + k for run in range(3) for k in spoil]
+    assert np.flatnonzero(found.outliers).tolist() == expected
+
+
+def test_a_load_cell_of_each_run_without_a_held_out_run():
+    offsets = (0.4, -0.2, 0.1)
+    measurement = measured(added=lambda run, t: offsets[run])
+    for run in measurement.runs:
+        object.__setattr__(run, "holdout", False)
+    found = diagnose_test(PictureFrame([measurement]))
+    assert [e.name for e in found.effects] == ["load_drift"]
+    assert found.holdout_source == "leave one run out"
+    # The zero of the run that is left out is its own, or nothing could be said of it.
+    assert found.holdout_after < 1.15 * SIGMA
+    assert any("zero" in note for note in found.notes)
+    for number, offset in enumerate(offsets, 1):
+        values, std = found.final.values, found.final.errors_at(SIGMA)
+        assert abs(values[f"run{number}_offset_N"] - offset) < 4.0 * std[f"run{number}_offset_N"]
+
+
+def test_no_candidate_fits_worse_than_the_baseline():
+    # Fits in which far readings count less need not come near them.
+    found = diagnosed(added=lambda run, t: 0.5 * np.sin(t / 3.0))
+    before = found.baseline.rms(found.baseline.used)
+    for candidate in found.candidates:
+        assert candidate.fit.rms(found.baseline.used) <= before * (1.0 + 1e-9)
