@@ -281,10 +281,14 @@ class PictureFrame:
         """What the load cell adds; in a run that is not fitted, what fits best to what is left."""
         assert variant.reading is not None
         names = dict.fromkeys(p.name.split("_", 1)[1] for p in variant.parameters)
-        unit = Marched(("time",), tuple(names))
-        added = variant.reading(unit.at, unit.at["time"])
-        slopes = unit.define({"force": added}, {})(self._points, dict.fromkeys(names, 0.0))
-        columns = slopes["force"].slopes
+        # The form's, not the variant's, which may have parameters of fewer runs.
+        key = id(variant.reading)
+        if key not in self._compiled:
+            unit = Marched(("time",), tuple(names))
+            added = variant.reading(unit.at, unit.at["time"])
+            self._compiled[key] = unit.define({"force": added}, {})
+        added = self._compiled[key](self._points, dict.fromkeys(names, 0.0))["force"]
+        columns = added.slopes
         shape = self._points["time"].value.shape
         total, found = np.zeros(shape), {}
         left = self.readings.observed - self._at_readings(force)

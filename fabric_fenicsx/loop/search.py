@@ -84,6 +84,7 @@ class _Search:
         self.judge = Judge(experiment)
         self.effects = [e for e in experiment.effects if names is None or e.name in names]
         self._forms: dict[int, list[Fit]] = {}
+        self._paired: list[Model] = []
         start = {p.name: p.starts[0] for p in experiment.baseline}
         self.baseline = fit(experiment, (), start, self.judge.rows)
         self.judge.estimate_noise(self.baseline)
@@ -145,7 +146,7 @@ class _Search:
                 if again and self._explains(again[0]):
                     nearest = (again[0], nearest[1])
                 else:
-                    nearest, explained = self._choose(singles)
+                    nearest, explained = self._choose(singles, again=True)
             if self._explains(self.baseline) and not self._foretells(nearest, candidates):
                 nearest, quiet = (self.baseline, ()), True
         for candidate in candidates:
@@ -236,8 +237,12 @@ class _Search:
                 continue
         return fits
 
-    def _choose(self, singles: list[Candidate]) -> tuple[Model, bool]:
+    def _choose(self, singles: list[Candidate], again: bool = False) -> tuple[Model, bool]:
         """The best model of one effect, or of two where one does not explain the data.
+
+        Args:
+            singles: the effects by themselves, the best first.
+            again: fits of pairs go on from those of the last time.
 
         Returns:
             The model that explains the data, or comes nearest, and whether it explains them.
@@ -253,7 +258,11 @@ class _Search:
         # effect looked for.
         if explained and self._settled(single[0]):
             return single, True
-        pairs, forms = self._pairs(singles)
+        if again and self._paired:
+            forms = self._paired_again()
+        else:
+            forms = self._paired = self._pairs(singles)
+        pairs = self._best_of(forms)
         if not pairs:
             return single, explained
         pair, both_explain = self._first_that_explains(pairs, forms)
@@ -294,42 +303,36 @@ class _Search:
         explaining.sort(key=lambda m: (has_own(m[0].variants), self.judge.excess(m[0])))
         return (explaining[0], True) if explaining else (near[0], False)
 
-    def _pairs(self, singles: list[Candidate]) -> tuple[list[Model], list[Model]]:
-        """The first few effects with each of the others, the stronger first.
-
-        Returns:
-            Each pair in the forms that fit best, and in all forms that were fitted.
-        """
+    def _pairs(self, singles: list[Candidate]) -> list[Model]:
+        """The first few effects with each of the others, the stronger first, in all their forms."""
         found: list[Model] = []
-        forms: list[Model] = []
         pairs = [(a, b) for a, b in combinations(singles, MOST) if singles.index(a) < FIRST]
         for k, (a, b) in enumerate(pairs):
             self.progress(0.6 + 0.3 * k / len(pairs), f"fit {a.effect.name}, {b.effect.name}")
             if a.fit is not None:
-                self._best_of(found, forms, self._forms_of(a.fit, b.effect), (a.effect, b.effect))
+                found += [(f, (a.effect, b.effect)) for f in self._forms_of(a.fit, b.effect)]
         # The form of the first was chosen without the second: now with it.
-        found.sort(key=lambda pair: self.judge.criterion(pair[0]))
-        for both, effects in found[:FIRST]:
+        for both, effects in self._best_of(found)[:FIRST]:
             try:
                 rest = without(self.experiment, both, effects[0].variants)
             except SolveError:
                 continue
-            self._best_of(found, forms, self._forms_of(rest, effects[0]), effects)
-        return found, forms
+            found += [(f, effects) for f in self._forms_of(rest, effects[0])]
+        return found
 
-    def _best_of(
-        self, found: list[Model], forms: list[Model], fits: list[Fit], effects: tuple[Effect, ...]
-    ) -> None:
-        """Add fits of a pair to all forms, and the best of them in the place of one not as good."""
-        forms += [(model, effects) for model in fits]
-        known = [k for k, pair in enumerate(found) if pair[1] == effects]
-        best = min(fits, key=self.judge.criterion, default=None)
-        if best is None:
-            return
-        if not known:
-            found.append((best, effects))
-        elif self.judge.criterion(best) < self.judge.criterion(found[known[0]][0]):
-            found[known[0]] = (best, effects)
+    def _paired_again(self) -> list[Model]:
+        """The pairs tried before, in their best forms, fitted to the readings as they are now."""
+        fits = (
+            (self._fitted_again([both]), effects) for both, effects in self._best_of(self._paired)
+        )
+        return [(found[0], effects) for found, effects in fits if found]
+
+    def _best_of(self, models: list[Model]) -> list[Model]:
+        """Of each pair of effects the forms that fit best, the best first."""
+        best: dict[tuple[str, ...], Model] = {}
+        for model in sorted(models, key=lambda m: self.judge.criterion(m[0])):
+            best.setdefault(tuple(e.name for e in model[1]), model)
+        return list(best.values())
 
     def _least_squares(self, model: Fit) -> Fit:
         """A fit in which no reading counts less: no worse, by the squares, than the baseline."""
