@@ -18,11 +18,11 @@ from ..errors import SolveError
 from .diagnosis import Candidate, Diagnosis, Verdict
 from .effects import Effect
 from .experiment import Experiment
-from .fitting import Fit, fit, parameters_of, without
+from .fitting import Fit, fit, parameters_of, soft_size, without
 from .judge import FAR, Judge, has_own
 from .noise import LIMIT
 from .scores import score_tests
-from .starts import fit_from_grid
+from .starts import WORTHWHILE, fit_from_grid
 
 __all__ = ["diagnose_test"]
 
@@ -213,11 +213,9 @@ class _Search:
 
     # Fits ---------------------------------------------------------------------------------
 
-    def _forms_of(self, base: Fit, effect: Effect) -> list[Fit]:
-        return fit_from_grid(self.experiment, base, effect.variants, robust=FAR * self.judge.noise)
-
-    def _best_variant(self, base: Fit, effect: Effect) -> Fit | None:
-        return min(self._forms_of(base, effect), key=self.judge.criterion, default=None)
+    def _forms_of(self, base: Fit, effect: Effect, known: float = float("inf")) -> list[Fit]:
+        robust = FAR * self.judge.noise
+        return fit_from_grid(self.experiment, base, effect.variants, robust=robust, known=known)
 
     def _fitted_again(self, forms: list[Fit]) -> list[Fit]:
         """The best of some models, fitted to the readings that are fitted now."""
@@ -310,15 +308,27 @@ class _Search:
         for k, (a, b) in enumerate(pairs):
             self.progress(0.6 + 0.3 * k / len(pairs), f"fit {a.effect.name}, {b.effect.name}")
             if a.fit is not None:
-                found += [(f, (a.effect, b.effect)) for f in self._forms_of(a.fit, b.effect)]
+                forms = self._forms_of(a.fit, b.effect, self._fitted_so_far(found))
+                found += [(f, (a.effect, b.effect)) for f in forms]
         # The form of the first was chosen without the second: now with it.
+        known = self._fitted_so_far(found)
         for both, effects in self._best_of(found)[:FIRST]:
+            if self._size(both) > WORTHWHILE * known:
+                continue
             try:
                 rest = without(self.experiment, both, effects[0].variants)
             except SolveError:
                 continue
-            found += [(f, effects) for f in self._forms_of(rest, effects[0])]
+            found += [(f, effects) for f in self._forms_of(rest, effects[0], known)]
         return found
+
+    def _fitted_so_far(self, models: list[Model]) -> float:
+        """The least that one of some models leaves which leaves noise; infinite if none does."""
+        sizes = (self._size(model) for model, _ in models if self.judge.fits(model))
+        return min(sizes, default=float("inf"))
+
+    def _size(self, model: Fit) -> float:
+        return soft_size((model.residual * model.weight)[model.used], FAR * self.judge.noise)
 
     def _paired_again(self) -> list[Model]:
         """The pairs tried before, in their best forms, fitted to the readings as they are now."""
@@ -371,4 +381,5 @@ class _Search:
             base = without(self.experiment, chosen, own.variants)
         except SolveError:
             return None
-        return self._best_variant(base, other)
+        forms = self._forms_of(base, other, self._size(chosen))
+        return min(forms, key=self.judge.criterion, default=None)

@@ -14,7 +14,7 @@ from .effects import Parameter, Variant
 from .experiment import Experiment
 from .fitting import Fit, fit, parameters_of, soft_size, weighted
 
-__all__ = ["SMALL", "Signature", "fit_from_grid", "signatures"]
+__all__ = ["SMALL", "WORTHWHILE", "Signature", "fit_from_grid", "signatures"]
 
 Array = npt.NDArray[np.float64]
 
@@ -42,6 +42,7 @@ def fit_from_grid(
     starts: int = 2,
     evaluations: int = 60,
     robust: float | None = None,
+    known: float = float("inf"),
 ) -> list[Fit]:
     """Add one of several forms of an effect to a fitted model.
 
@@ -55,6 +56,7 @@ def fit_from_grid(
         starts: how many starts of each form are followed.
         evaluations: of the model at most, from each.
         robust: see fit.
+        known: sum of squares that some other model leaves.
 
     Returns:
         The model with each form that has a solution.
@@ -90,7 +92,7 @@ def fit_from_grid(
         fits.append(found)
     sizes = [soft_size((f.residual * f.weight)[f.used], robust) for f in fits]
     for k, found in enumerate(fits):
-        if sizes[k] <= WORTHWHILE * min(sizes):
+        if sizes[k] <= WORTHWHILE * min(*sizes, known):
             found = _again(experiment, found, found.values, evaluations, robust)
             fits[k] = _around_jumps(experiment, found, evaluations, robust)
     return fits
