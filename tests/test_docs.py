@@ -15,6 +15,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fabric_fenicsx.loop.cantilever_effects import CANTILEVER_EFFECTS
+from fabric_fenicsx.loop.drape_effects import DRAPE_EFFECTS
+from fabric_fenicsx.loop.picture_frame_effects import PICTURE_FRAME_EFFECTS
+
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 BUILT = {"gallery", "keys.md"}
@@ -29,6 +33,14 @@ def blocks(page):
     """(slow, kind, file, text) of each block of a page."""
     for slow, file, kind, text in BLOCK.findall(page.read_text(encoding="utf-8")):
         yield bool(slow), kind, file, text
+
+
+def test_every_form_of_every_effect_is_in_the_tutorial():
+    text = (DOCS / "tutorial_measurements.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| (\w+) \| (.*) \|$", text.split("## What is tried")[1], re.M))
+    effects = (*PICTURE_FRAME_EFFECTS, *CANTILEVER_EFFECTS, *DRAPE_EFFECTS)
+    for effect in effects:
+        assert [v.label for v in effect.variants if v.label not in rows[effect.name]] == []
 
 
 def with_commands(slow):
