@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from mpi4py import MPI
-from petsc4py import PETSc
 
 import numpy as np
 import numpy.typing as npt
@@ -287,12 +286,7 @@ class HangingTow:
         model, newton = self.model, self._newton
         model.gravity.value[:] = load * np.array([-np.sin(self._phi), 0.0, -np.cos(self._phi)])
         newton.x.set(0.0)
-        try:
-            if not newton.solve(model.targets(0.0, 0.0)).converged:
-                return False
-        except PETSc.Error:
-            # A tangent that MUMPS cannot factorise at all leaves a solver that is of no more use.
-            self._newton = self.model.newton(force_tolerance=newton.force_tolerance, limit=LIMIT)
+        if not newton.solve(model.targets(0.0, 0.0)).converged:
             return False
         model.disc.everywhere(advance_fields)
         return True
