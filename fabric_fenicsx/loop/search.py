@@ -101,9 +101,12 @@ class _Search:
         if changed:
             self.baseline = fit(self.experiment, (), self.baseline.values, rows)
         if rows.sum() <= len(self.baseline.values):
+            readings = self.experiment.readings
+            unknown = int((~readings.usable & ~readings.holdout).sum())
             raise SolveError(
-                f"the baseline has {len(self.baseline.values)} parameters "
-                f"and there are {int(rows.sum())} readings to fit"
+                f"the baseline has {len(self.baseline.values)} parameters and there are "
+                f"{int(rows.sum())} readings to fit"
+                + (f"; at {unknown} others the rate of the motion is not known" if unknown else "")
             )
         return changed
 
