@@ -266,6 +266,8 @@ class _Search:
         pairs = self._best_of(forms)
         if not pairs:
             return single, explained
+        # So many forms of pairs, leaning on their doubt, would explain almost anything.
+        forms = [model for model in forms if self.judge.foresees(model[0])]
         pair, both_explain = self._first_that_explains(pairs, forms)
         gain = self.judge.criterion(single[0]) - self.judge.criterion(pair[0])
         if not explained:
