@@ -143,13 +143,11 @@ class _Search:
         quiet = explained and silent
         if not silent:
             nearest, explained = self._choose(singles)
-            if self._leave_out(nearest[0]):
+            for _ in range(ROUNDS):
+                if not self._leave_out(nearest[0]):
+                    break
                 candidates, singles = self._tried(again=True)
-                again = self._fitted_again([nearest[0]]) if explained else []
-                if again and self._explains(again[0]):
-                    nearest = (again[0], nearest[1])
-                else:
-                    nearest, explained = self._choose(singles, again=True)
+                nearest, explained = self._choose(singles, again=True)
             if self._explains(self.baseline) and not self._foretells(nearest, candidates):
                 nearest, quiet = (self.baseline, ()), True
         for candidate in candidates:
@@ -375,16 +373,20 @@ class _Search:
                 if len(effects) == 1:
                     instead = other.fit
                 else:
-                    instead = self._instead(chosen, own, other.effect)
+                    instead = self._instead(chosen, effects, own, other.effect)
                 if instead is not None and self.judge.criterion(instead, self.judge.near) < limit:
                     found[own.name].append(other.effect.name)
         return found
 
-    def _instead(self, chosen: Fit, own: Effect, other: Effect) -> Fit | None:
+    def _instead(
+        self, chosen: Fit, effects: tuple[Effect, ...], own: Effect, other: Effect
+    ) -> Fit | None:
         """A model of two effects with another one in the place of one of them."""
+        kept = {e.name for e in effects if e is not own}
+        forms = [m for m, pair in self._paired if {e.name for e in pair} == {other.name, *kept}]
         try:
             base = without(self.experiment, chosen, own.variants)
+            forms += self._forms_of(base, other, self._size(chosen))
         except SolveError:
-            return None
-        forms = self._forms_of(base, other, self._size(chosen))
+            pass
         return min(forms, key=self.judge.criterion, default=None)
