@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -180,27 +180,21 @@ def thinner_tow() -> Iterator[None]:
 def sliding() -> Iterator[Row]:
     """Coulomb friction."""
     exact = float(np.exp(friction.MU * np.pi / 2))
-    ratio = friction.over_a_drum(40)[-1]
-    yield Row(
-        "Tow pulled over a drum, a quarter turn, μ = 0.3, 40 cells⁴",
-        "T2/T1",
-        number(exact),
-        CLOSED,
-        "capstan, exp(μφ)",
-        number(ratio, 6),
-        size(ratio / exact - 1),
-    )
-    with thinner_tow():
-        ratio = friction.over_a_drum(40)[-1]
-    yield Row(
-        "the same, tow half as high",
-        "T2/T1",
-        number(exact),
-        CLOSED,
-        "capstan, exp(μφ)",
-        number(ratio, 6),
-        size(ratio / exact - 1),
-    )
+    for tow, section in (
+        ("Tow pulled over a drum, a quarter turn, μ = 0.3, 40 cells⁴", nullcontext()),
+        ("the same, tow half as high", thinner_tow()),
+    ):
+        with section:
+            ratio = friction.over_a_drum(40)[-1]
+        yield Row(
+            tow,
+            "T2/T1",
+            number(exact),
+            CLOSED,
+            "capstan, exp(μφ)",
+            number(ratio, 6),
+            size(ratio / exact - 1),
+        )
     coarse, fine = (friction.over_a_drum(20, steps=n)[-1] for n in (10, 40))
     yield Row(
         "the same, 20 cells",
