@@ -193,7 +193,7 @@ class EyringDashpot:
         """Asinh x = ln(x + √(x² + 1)) of |x|, with the sign of the rate."""
         x = at.rate / at.number(self.rate)
         size = at.number(self.c) * ln(_size(x) + sqrt(x**2 + 1))
-        return conditional(ge(x, 0), size, -size)
+        return _signed(x, size)
 
     def history(self, at: Crossing) -> dict[str, Any]:
         """None."""
@@ -299,7 +299,7 @@ class Locking:
         """Zero below γ_L."""
         past_it = max_value(_size(at.gamma) - at.number(self.angle), 0)
         beyond = at.number(self.stiffness) * past_it**self.power
-        return conditional(ge(at.gamma, 0), beyond, -beyond)
+        return _signed(at.gamma, beyond)
 
     def history(self, at: Crossing) -> dict[str, Any]:
         """None."""
@@ -325,7 +325,7 @@ class ExponentialLocking:
         """Zero below γ_L."""
         past_it = max_value(_size(at.gamma) - at.number(self.angle), 0)
         beyond = at.number(self.moment_scale) * (exp(past_it / at.number(self.scale)) - 1)
-        return conditional(ge(at.gamma, 0), beyond, -beyond)
+        return _signed(at.gamma, beyond)
 
     def history(self, at: Crossing) -> dict[str, Any]:
         """None."""
@@ -352,15 +352,20 @@ class SmoothLocking:
         angle, width = at.number(self.angle), at.number(self.width)
         past_it = ln(1 + exp((_size(at.gamma) - angle) / width)) - ln(1 + exp(-angle / width))
         beyond = at.number(self.stiffness) * width * past_it
-        return conditional(ge(at.gamma, 0), beyond, -beyond)
+        return _signed(at.gamma, beyond)
 
     def history(self, at: Crossing) -> dict[str, Any]:
         """None."""
         return {}
 
 
+def _signed(x: Any, size: Any) -> Any:
+    """A size with the sign of x."""
+    return conditional(ge(x, 0), size, -size)
+
+
 def _size(x: Any) -> Any:
-    return conditional(ge(x, 0), x, -x)
+    return _signed(x, x)
 
 
 def _check_table(name: str, x: tuple[float, ...], y: tuple[float, ...]) -> None:
@@ -390,4 +395,4 @@ def _interpolated(
         c = [coefficients[4 * i + j] for j in range(4)]
         piece = ((c[0] * s + c[1]) * s + c[2]) * s + c[3]
         value = conditional(lt(size, knots[i + 1]), piece, value)
-    return conditional(ge(at, 0), value, -value)
+    return _signed(at, value)
