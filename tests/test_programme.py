@@ -63,3 +63,28 @@ def test_a_dense_sine_is_known_to_two_percent_and_a_sparse_one_not_at_all():
     # Five readings a cycle: what agrees does so by chance.
     p, speed = found(driven, np.linspace(0.0, driven.duration, 13))
     assert p.certain.sum() <= 2
+
+
+@pytest.mark.parametrize("control", ["crosshead", "angle"])
+@pytest.mark.parametrize("count", [14, 15, 17, 19])
+def test_one_speed_to_and_fro_is_known_from_few_readings(control, count):
+    # Three or four readings on a leg: few of them lie in line with two others.
+    driven = triangle(FRAME, 0.8, 0.0, 0.03, 2, control=control)
+    times = np.linspace(0.0, driven.duration, count)
+    p, speed = found(driven, times)
+    assert p.certain.sum() >= count - 4
+    assert rates(p)[p.certain] == pytest.approx(speed[p.certain], rel=1e-6)
+    # It turns when it turned, and goes as far.
+    turns = p.reading < 0
+    for when, where in zip(p.time[turns], p.displacement[turns], strict=True):
+        assert np.abs(np.array(driven.corners) - when).min() < 1e-6 * driven.duration
+        assert where == pytest.approx(float(driven.drive(FRAME, when)[0]), abs=1e-4)
+
+
+@pytest.mark.parametrize("count", [13, 17, 19, 23])
+def test_a_sparse_sine_is_not_taken_for_it(count):
+    driven = sine(0.7, -0.7, 0.05)
+    p, speed = found(driven, np.linspace(0.0, driven.duration, count))
+    assert p.certain.mean() < 0.5
+    away = np.abs(rates(p) - speed)[p.certain] / np.abs(speed).max()
+    assert away.max(initial=0.0) < 0.06

@@ -27,6 +27,10 @@ JUMP_RATIO = 4.0
 DOUBT = 0.02
 #: Points put between two readings where the speed changes much.
 BETWEEN = 7
+#: Share of the readings whose rate is known below which a motion at one speed is looked for ...
+SPARSE = 0.6
+#: ... and the intervals at that speed that it takes.
+LEGS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +67,10 @@ def frame_programme(time: Array, displacement: Array, frame_length: float) -> Pr
         frame_length: [mm].
     """
     resolution = _resolution(displacement)
-    crosshead = programme(time, displacement, resolution)
+    crosshead = _best_known(time, displacement, resolution)
     gamma = np.pi / 2 - 2 * np.arccos((np.sqrt(2.0) + displacement / frame_length) / 2)
     steepest = float(np.max(1.0 / np.sin(np.pi / 4 - gamma / 2)))
-    angle = programme(time, gamma, resolution * steepest / frame_length)
+    angle = _best_known(time, gamma, resolution * steepest / frame_length)
     if not _clearer(angle, crosshead):
         return crosshead
     theta = np.pi / 4 - angle.displacement / 2
@@ -77,6 +81,15 @@ def frame_programme(time: Array, displacement: Array, frame_length: float) -> Pr
         rate=lever * angle.rate,
         doubt=frame_length * np.sin(np.pi / 4 - gamma / 2) * angle.doubt,
     )
+
+
+def _best_known(time: Array, values: Array, resolution: float) -> Programme:
+    """The programme of a record, that at one speed where it is sparse and that tells more."""
+    general = programme(time, values, resolution)
+    if general.certain.mean() >= SPARSE:
+        return general
+    steady = _to_and_fro(time, values, resolution)
+    return general if steady is None or not _clearer(steady, general) else steady
 
 
 def _clearer(one: Programme, other: Programme) -> bool:
@@ -150,6 +163,48 @@ def programme(time: Array, displacement: Array, resolution: float | None = None)
     columns = np.array(points)
     return Programme(
         columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3].astype(np.int64), doubt, certain
+    )
+
+
+def _to_and_fro(time: Array, values: Array, resolution: float) -> Programme | None:
+    """The programme of a motion to and fro at one speed; None if the record is not that of one.
+
+    Intervals without a turn all show that speed, and those with one less. So two readings tell a
+    leg where others have told the speed, and what is missing in between tells when it turned.
+    """
+    step = np.diff(time)
+    speed = np.diff(values) / step
+    top = float(np.abs(speed).max())
+    leg = top - np.abs(speed) <= 4.0 * resolution / step + 1e-6 * top
+    way = np.where(leg, np.sign(speed), 0.0)
+    if leg.sum() < LEGS or not (leg[:-1] & (way[:-1] == way[1:])).any():
+        return None
+    turning = np.flatnonzero(~leg)
+    inner = turning[(turning > 0) & (turning < len(leg) - 1)]
+    if (way[inner - 1] * way[inner + 1] != -1.0).any():
+        return None
+    top = float(np.median(np.abs(speed[leg])))
+    # Up to the turn at one speed, from it at the other: half of what is missing comes after it.
+    rise = np.diff(values)[inner] * way[inner - 1]
+    corners = time[inner] + (step[inner] + rise / top) / 2.0
+    reached = values[inner] + way[inner - 1] * top * (corners - time[inner])
+    rate = np.append(way, 0.0)
+    rate = top * np.where(rate == 0.0, np.append(0.0, way), rate)
+    known = np.append(leg, False) | np.append(False, leg)
+    # At a reading where the way changes it turned just there.
+    known[1:-1] &= way[:-1] * way[1:] != -1.0
+    points = np.concatenate(
+        [
+            np.column_stack([time, values, rate, np.arange(len(time))]),
+            np.column_stack([corners, reached, top * way[inner - 1], np.full(len(inner), -1)]),
+        ]
+    )
+    points = points[np.argsort(points[:, 0])]
+    doubt = np.where(known, 0.0, np.inf)
+    if abs(values[0]) <= max(resolution, 1e-6 * float(np.ptp(values))):
+        known[0] = False
+    return Programme(
+        points[:, 0], points[:, 1], points[:, 2], points[:, 3].astype(np.int64), doubt, known
     )
 
 

@@ -98,7 +98,7 @@ class PolynomialSpring:
         g = at.gamma
         terms = []
         for power, value in sorted(self.coefficients.items()):
-            size = g**power if power % 2 else conditional(ge(g, 0), g**power, -(g**power))
+            size = g**power if power % 2 else _signed(g, g**power)
             terms.append(at.number(value) * size)
         return sum(terms)
 
