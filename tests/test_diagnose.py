@@ -241,20 +241,21 @@ def test_a_drape_takes_the_shear_law_of_the_frames(diagnosed, tmp_path, monkeypa
     assert text.count("<section>") == 2 and (tmp_path / "out/drape_data.png").exists()
 
 
-def test_two_ranks_report_the_same(diagnosed, tmp_path):
-    folder, out = diagnosed["crossover_friction-dahl"]
+def on_two_ranks(*arguments):
+    """The command diagnose under mpirun, ended."""
     env = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
     program = ["/usr/bin/mpirun", "-n", "2", sys.executable, "-m", "fabric_fenicsx", "diagnose"]
+    return subprocess.run(
+        [*program, *map(str, arguments)],
+        env=env | MPI,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        timeout=120,
+    )
 
-    def on_two_ranks(*arguments):
-        return subprocess.run(
-            [*program, *map(str, arguments)],
-            env=env | MPI,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=120,
-        )
 
+def test_two_ranks_report_the_same(diagnosed, tmp_path):
+    folder, out = diagnosed["crossover_friction-dahl"]
     process = on_two_ranks(folder, "--out", tmp_path / "two")
     assert process.returncode == 0, process.stderr
     assert (tmp_path / "two/report.json").read_bytes() == (out / "report.json").read_bytes()
@@ -262,3 +263,12 @@ def test_two_ranks_report_the_same(diagnosed, tmp_path):
     process = on_two_ranks(tmp_path, "--out", tmp_path / "bad")
     assert process.returncode == 2
     assert process.stderr.count(b"measurement.yaml") == 1
+
+
+def test_two_ranks_report_the_same_of_a_cantilever(tmp_path):
+    RECIPES["clamp_tilt-down"](tmp_path / "set")
+    assert command("diagnose", tmp_path / "set", "--out", tmp_path / "one", "--quiet") == 0
+    process = on_two_ranks(tmp_path / "set", "--out", tmp_path / "two")
+    assert process.returncode == 0, process.stderr
+    one, two = ((tmp_path / name / "report.json").read_bytes() for name in ("one", "two"))
+    assert one == two and b"clamp_tilt" in one
