@@ -215,8 +215,12 @@ class _Search:
     # Fits ---------------------------------------------------------------------------------
 
     def _forms_of(self, base: Fit, effect: Effect, known: float = float("inf")) -> list[Fit]:
+        # Where another model leaves noise already, one start of each form will do.
+        starts = 2 if known == float("inf") else 1
         robust = FAR * self.judge.noise
-        return fit_from_grid(self.experiment, base, effect.variants, robust=robust, known=known)
+        return fit_from_grid(
+            self.experiment, base, effect.variants, starts=starts, robust=robust, known=known
+        )
 
     def _fitted_again(self, forms: list[Fit]) -> list[Fit]:
         """The best of some models, fitted to the readings that are fitted now."""
@@ -308,6 +312,8 @@ class _Search:
         """The first few effects with each of the others, the stronger first, in all their forms."""
         found: list[Model] = []
         pairs = [(a, b) for a, b in combinations(singles, MOST) if singles.index(a) < FIRST]
+        # Effects of few forms first: where one pair leaves noise, others need less.
+        pairs.sort(key=lambda pair: len(pair[1].effect.variants))
         for k, (a, b) in enumerate(pairs):
             self.progress(0.6 + 0.3 * k / len(pairs), f"fit {a.effect.name}, {b.effect.name}")
             if a.fit is not None:
