@@ -262,7 +262,7 @@ class _Search:
         if explained and self._settled(single[0]):
             return single, True
         if again and self._paired:
-            forms = self._paired_again()
+            forms = self._paired = self._paired_again()
         else:
             forms = self._paired = self._pairs(singles)
         pairs = self._best_of(forms)
