@@ -83,7 +83,9 @@ def motions(test: Experiment, effects: list[Effect]) -> list[tuple[Motion, np.nd
         beside = np.append(times[:-1] + 1e-7 * last, times[-1] - 1e-7 * last)
         others = np.concatenate([fine, programme.corners, beside])
         # Two points of the grid that are one but for round-off would look like a rest.
-        near = np.abs(others[:, None] - times).min(axis=1) < 1e-9 * last
+        after = np.clip(np.searchsorted(times, others), 1, len(times) - 1)
+        away = np.minimum(np.abs(others - times[after - 1]), np.abs(others - times[after]))
+        near = away < 1e-9 * last
         grid = np.unique(np.concatenate([others[~near], times]))
         displacement, speed = programme.drive(test.frame, grid)
         travel = displacement
