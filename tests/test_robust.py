@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -42,6 +43,8 @@ def begun(case, folder, *, ranks=1, steps=3):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # Where the tests run in the background of a shell, Ctrl-C is ignored from there on.
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
     while len(glob.glob(f"{folder}/steps/step_*.npz")) < steps:
         assert process.poll() is None, process.stderr.read()

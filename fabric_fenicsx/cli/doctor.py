@@ -29,7 +29,7 @@ with TemporaryDirectory() as folder:
 """
 """Drawing may end the process that tries it."""
 
-RANKS = "from mpi4py import MPI; MPI.COMM_WORLD.barrier(); print(MPI.COMM_WORLD.size)"
+RANKS = "from mpi4py.MPI import COMM_WORLD as w; w.barrier(); w.rank or print(w.size)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,12 +150,8 @@ def _two_ranks() -> str | None:
     launcher = Path("/usr/bin/mpirun")
     if not launcher.exists():
         return None
-    # Once more if need be: another launcher that ends at that moment can take this one's files.
-    for _ in range(2):
-        done = _run([str(launcher), "-n", "2", sys.executable, "-c", RANKS])
-        if done.stdout.split() == ["2", "2"]:
-            return f"{launcher} starts them"
-    return None
+    done = _run([str(launcher), "-n", "2", sys.executable, "-c", RANKS])
+    return f"{launcher} starts them" if done.stdout.split() == ["2"] else None
 
 
 def _compiler() -> str | None:
