@@ -66,6 +66,10 @@ class Fit:
         """Of the weighted residuals that were fitted."""
         return float(np.sum((self.residual * self.weight)[self.used] ** 2))
 
+    def size(self, robust: float | None) -> float:
+        """Of the weighted residuals that were fitted; see soft_size."""
+        return soft_size((self.residual * self.weight)[self.used], robust)
+
     @property
     def freedom(self) -> int:
         """Readings less parameters."""

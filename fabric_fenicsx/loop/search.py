@@ -18,7 +18,7 @@ from ..errors import SolveError
 from .diagnosis import Candidate, Diagnosis, Verdict
 from .effects import Effect
 from .experiment import Experiment
-from .fitting import Fit, fit, parameters_of, soft_size, without
+from .fitting import Fit, fit, parameters_of, without
 from .judge import FAR, Judge, has_own
 from .noise import LIMIT
 from .scores import score_tests
@@ -337,7 +337,7 @@ class _Search:
         return min(sizes, default=float("inf"))
 
     def _size(self, model: Fit) -> float:
-        return soft_size((model.residual * model.weight)[model.used], FAR * self.judge.noise)
+        return model.size(FAR * self.judge.noise)
 
     def _paired_again(self) -> list[Model]:
         """The pairs tried before, in their best forms, fitted to the readings as they are now."""

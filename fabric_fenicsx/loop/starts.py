@@ -90,7 +90,7 @@ def fit_from_grid(
         except SolveError:
             continue
         fits.append(found)
-    sizes = [soft_size((f.residual * f.weight)[f.used], robust) for f in fits]
+    sizes = [f.size(robust) for f in fits]
     for k, found in enumerate(fits):
         if sizes[k] <= WORTHWHILE * min(*sizes, known):
             found = _again(experiment, found, found.values, evaluations, robust)
@@ -214,9 +214,7 @@ def _around_jumps(
             start = min(starts, key=lambda s: s.left)
             moved = {n: v + start.step.get(n, 0.0) for n, v in start.at.items()}
             again = _again(experiment, found, moved, evaluations, robust)
-            rows = found.used
-            sizes = [soft_size((f.residual * f.weight)[rows], robust) for f in (again, found)]
-            if sizes[0] < sizes[1]:
+            if again.size(robust) < found.size(robust):
                 found = again
     return found
 

@@ -81,8 +81,7 @@ class SlidingFriction:
     def moment(self, at: Crossing) -> Any:
         """The rounded sign of the rate, cut off where round-off has made it one."""
         sign = max_value(min_value(at.rate / at.number(self.floor), 20), -20)
-        size = conditional(ge(at.gamma, 0), at.gamma, -at.gamma)
-        return at.number(self.limit) * (1 + at.number(self.growth) * size) * tanh(sign)
+        return at.number(self.limit) * (1 + at.number(self.growth) * at.size) * tanh(sign)
 
     def history(self, at: Crossing) -> dict[str, Any]:
         """None."""

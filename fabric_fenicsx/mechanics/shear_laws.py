@@ -64,6 +64,11 @@ class Crossing:
         return self.gamma - self.gamma_n
 
     @property
+    def size(self) -> Any:
+        """|γ| [rad]."""
+        return _size(self.gamma)
+
+    @property
     def rate(self) -> Any:
         """γ̇ [rad/s]; as the difference quotient it is zero at once when the motion stops."""
         return self.change * self.per_time if self.known_rate is None else self.known_rate
@@ -273,7 +278,7 @@ class EvenSpring:
 
     def moment(self, at: Crossing) -> Any:
         """The power of |γ|."""
-        return at.number(self.stiffness) * _size(at.gamma) ** self.power
+        return at.number(self.stiffness) * at.size**self.power
 
     def history(self, at: Crossing) -> dict[str, Any]:
         """None."""
@@ -297,7 +302,7 @@ class Locking:
 
     def moment(self, at: Crossing) -> Any:
         """Zero below γ_L."""
-        past_it = max_value(_size(at.gamma) - at.number(self.angle), 0)
+        past_it = max_value(at.size - at.number(self.angle), 0)
         beyond = at.number(self.stiffness) * past_it**self.power
         return _signed(at.gamma, beyond)
 
@@ -323,7 +328,7 @@ class ExponentialLocking:
 
     def moment(self, at: Crossing) -> Any:
         """Zero below γ_L."""
-        past_it = max_value(_size(at.gamma) - at.number(self.angle), 0)
+        past_it = max_value(at.size - at.number(self.angle), 0)
         beyond = at.number(self.moment_scale) * (exp(past_it / at.number(self.scale)) - 1)
         return _signed(at.gamma, beyond)
 
@@ -350,7 +355,7 @@ class SmoothLocking:
     def moment(self, at: Crossing) -> Any:
         """The integral of a slope that goes from 0 to k about γ_L."""
         angle, width = at.number(self.angle), at.number(self.width)
-        past_it = ln(1 + exp((_size(at.gamma) - angle) / width)) - ln(1 + exp(-angle / width))
+        past_it = ln(1 + exp((at.size - angle) / width)) - ln(1 + exp(-angle / width))
         beyond = at.number(self.stiffness) * width * past_it
         return _signed(at.gamma, beyond)
 
