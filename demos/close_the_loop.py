@@ -22,12 +22,12 @@
 from pathlib import Path
 from typing import Any
 
-from fabric_fenicsx.loop.figures import data_figure, residual_figure
-from fabric_fenicsx.loop.measurement import read_measurement
-from fabric_fenicsx.loop.page import write_page
-from fabric_fenicsx.loop.picture_frame import PictureFrame
-from fabric_fenicsx.loop.report import test_report, write_report
-from fabric_fenicsx.loop.search import diagnose_test
+from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
+from fabric_fenicsx.loop.measurement.reading import read_measurement
+from fabric_fenicsx.loop.report.content import test_report, write_report
+from fabric_fenicsx.loop.report.figures import data_figure, residual_figure
+from fabric_fenicsx.loop.report.page import write_page
 from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
 from fabric_fenicsx.rigs.load import load_case
 

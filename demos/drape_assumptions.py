@@ -17,11 +17,11 @@ from mpi4py import MPI
 
 import numpy as np
 
+from fabric_fenicsx.output.record import prepare_folder
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session
 from fabric_fenicsx.rigs.load import load_case
-from fabric_fenicsx.solving.record import prepare_folder
 
 CASE = Path(__file__).parent / "drape.yaml"
 

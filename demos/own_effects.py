@@ -15,7 +15,7 @@ from typing import Any
 
 from ufl import tanh
 
-from fabric_fenicsx.loop.effects import Effect, FrameVariant, Parameter
+from fabric_fenicsx.loop.inference.effects import Effect, FrameVariant, Parameter
 from fabric_fenicsx.mechanics.shear_laws import Crossing
 
 # %% [markdown]

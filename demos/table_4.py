@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 import yaml
 
-from fabric_fenicsx.loop.diagnosis import Diagnosis
-from fabric_fenicsx.loop.drape import Drape
-from fabric_fenicsx.loop.drape_effects import DRAPE_EFFECTS
-from fabric_fenicsx.loop.measurement import FILE, SCHEMA, read_measurement
-from fabric_fenicsx.loop.page import write_page
-from fabric_fenicsx.loop.report import test_report, write_report
-from fabric_fenicsx.loop.search import diagnose_test
-from fabric_fenicsx.loop.shear_field import Solve, solved_field
+from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
+from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
+from fabric_fenicsx.loop.kinds.drape.model import Drape
+from fabric_fenicsx.loop.kinds.drape.shear_field import Solve, solved_field
+from fabric_fenicsx.loop.measurement.reading import FILE, SCHEMA, read_measurement
+from fabric_fenicsx.loop.report.content import test_report, write_report
+from fabric_fenicsx.loop.report.page import write_page
 from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from .rigs.keys import unit
+from .inputs.keys import unit
 
 __all__ = ["counting", "following", "searching", "summarise", "summarise_diagnosis"]
 
@@ -196,7 +196,7 @@ def _heading(key: str) -> str:
 
 def _ending(name: str) -> str:
     """The part of a name that is its unit."""
-    from .rigs.keys import UNITS
+    from .inputs.keys import UNITS
 
     return next(("_" + end for end in UNITS if name.endswith("_" + end)), "")
 

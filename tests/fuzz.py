@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from fabric_fenicsx.rigs.keys import CASES
+from fabric_fenicsx.rigs.cases import CASES
 from fabric_fenicsx.rigs.write_case import template
 
 DEMOS = Path(__file__).parents[1] / "demos"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fabric_fenicsx.errors import InputError
-from fabric_fenicsx.rigs.cases import CantileverCase, DrapeCase
-from fabric_fenicsx.rigs.keys import CASES, documented, plain
+from fabric_fenicsx.inputs.keys import documented, plain
+from fabric_fenicsx.rigs.cases import CASES, CantileverCase, DrapeCase
 from fabric_fenicsx.rigs.load import load_case
 
 DEMOS = Path(__file__).parents[1] / "demos"

@@ -12,7 +12,8 @@ import pytest
 from fabric_fenicsx import __version__
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.cli.app import EXAMPLES
-from fabric_fenicsx.rigs.keys import CASES, documented
+from fabric_fenicsx.inputs.keys import documented
+from fabric_fenicsx.rigs.cases import CASES
 
 TINY = """\
 test: drape
@@ -253,7 +254,7 @@ def test_missing_case_file_makes_no_folder(tmp_path):
 def test_an_error_on_one_rank_ends_all(case, tmp_path):
     code = """
 from mpi4py import MPI
-import fabric_fenicsx.solving.record as record
+import fabric_fenicsx.output.record as record
 from fabric_fenicsx.__main__ import main
 def broken(folder, comm):
     if comm.rank == 1:

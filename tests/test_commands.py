@@ -12,8 +12,9 @@ import yaml
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.cli import doctor
 from fabric_fenicsx.fabric.gmsh_io import read_msh
+from fabric_fenicsx.inputs.keys import documented
+from fabric_fenicsx.rigs.cases import CASES
 from fabric_fenicsx.rigs.estimate import estimate
-from fabric_fenicsx.rigs.keys import CASES, documented
 from fabric_fenicsx.rigs.load import load_case
 from fabric_fenicsx.rigs.write_case import case_text, template
 

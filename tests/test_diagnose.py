@@ -19,9 +19,9 @@ from test_cli import MPI, contents
 from test_drape_loop import angle, made_up, marks, written
 
 from fabric_fenicsx.__main__ import main
-from fabric_fenicsx.loop import drape
-from fabric_fenicsx.loop.drape import Drape
-from fabric_fenicsx.loop.report import SCHEMA, parameter_unit
+from fabric_fenicsx.loop.kinds.drape import model as drape
+from fabric_fenicsx.loop.kinds.drape.model import Drape
+from fabric_fenicsx.loop.report.content import SCHEMA, parameter_unit
 
 RECIPES = {recipe.name: recipe for recipe in sixty(1)}
 #: One set of each verdict, with the effects in it.

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fabric_fenicsx.loop.cantilever_effects import CANTILEVER_EFFECTS
-from fabric_fenicsx.loop.drape_effects import DRAPE_EFFECTS
-from fabric_fenicsx.loop.picture_frame_effects import PICTURE_FRAME_EFFECTS
+from fabric_fenicsx.loop.kinds.cantilever.effects import CANTILEVER_EFFECTS
+from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
+from fabric_fenicsx.loop.kinds.picture_frame.effects import PICTURE_FRAME_EFFECTS
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -12,25 +12,25 @@ from scipy.optimize import least_squares
 from test_demos import demo
 
 from fabric_fenicsx.errors import InputError, SolveError
-from fabric_fenicsx.loop.drape import OTHER_MESH, Drape, nearest_next
-from fabric_fenicsx.loop.drape_effects import DRAPE_EFFECTS
-from fabric_fenicsx.loop.fitting import fit
-from fabric_fenicsx.loop.measurement import read_measurement
-from fabric_fenicsx.loop.report import test_report as report_of
-from fabric_fenicsx.loop.search import diagnose_test
-from fabric_fenicsx.loop.shear_field import (
+from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
+from fabric_fenicsx.loop.kinds.drape.model import OTHER_MESH, Drape, nearest_next
+from fabric_fenicsx.loop.kinds.drape.shear_field import (
     ShearField,
     ShearLaw,
     drape_case,
     hermite_weights,
     solved_field,
 )
+from fabric_fenicsx.loop.measurement.reading import read_measurement
+from fabric_fenicsx.loop.report.content import test_report as report_of
 from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
 from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session, control
 from fabric_fenicsx.rigs.drape import build
+from fabric_fenicsx.rigs.simulation import simulate
 from fabric_fenicsx.solving.parts import ContactLaw
-from fabric_fenicsx.solving.simulation import simulate
 
 RIG = {
     "punch_radius_mm": 76.2,

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fabric_fenicsx.loop.measurement import FabricKeys, Measurement, PictureFrameRig, Run
-from fabric_fenicsx.loop.picture_frame import PictureFrame
-from fabric_fenicsx.loop.search import diagnose_test
+from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
+from fabric_fenicsx.loop.measurement.reading import FabricKeys, Measurement, PictureFrameRig, Run
 
 LENGTH, FABRIC, TRAVEL, SIGMA = 192.0, 96.0, 60.0, 0.02
 K1, K3, C1 = 0.05, 0.2, 1.5

@@ -16,8 +16,8 @@ from fabric_fenicsx.output import files
 from fabric_fenicsx.output.lines import COLOURS
 from fabric_fenicsx.output.paraview import TimeSeries
 from fabric_fenicsx.output.pictures import VIEWS, draw_net
-from fabric_fenicsx.output.snapshot import Snapshot, at_rest
 from fabric_fenicsx.output.surfaces import RevolvedSurface
+from fabric_fenicsx.solving.snapshot import Snapshot, at_rest
 
 ARRAYS = [field.name for field in fields(Snapshot) if field.name != "time"]
 SMALL = (320, 240)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from measurements.programmes import Frame, load_hold, sine, triangle
 
-from fabric_fenicsx.loop.programme import frame_programme
+from fabric_fenicsx.loop.kinds.picture_frame.motion import frame_programme
 
 FRAME = Frame()
 

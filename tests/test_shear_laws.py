@@ -24,9 +24,9 @@ from fabric_fenicsx.mechanics.shear_laws import (
     TabulatedDashpot,
     TabulatedSpring,
 )
+from fabric_fenicsx.rigs.simulation import simulate
 from fabric_fenicsx.solving.model import Model, Support
 from fabric_fenicsx.solving.parts import CrossoverLaw
-from fabric_fenicsx.solving.simulation import simulate
 from fabric_fenicsx.solving.stepping import StepControl
 
 STIFF = RectangularSection(width=4.57, height=0.04, density=7e-9, C1=6e7)

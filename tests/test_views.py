@@ -22,8 +22,8 @@ from fabric_fenicsx.output.film import encoder
 from fabric_fenicsx.output.mirror import whole_sheet
 from fabric_fenicsx.output.paraview import TimeSeries
 from fabric_fenicsx.output.results import read_results, write_setup
-from fabric_fenicsx.output.snapshot import Snapshot, at_rest
 from fabric_fenicsx.output.surfaces import RevolvedSurface
+from fabric_fenicsx.solving.snapshot import Snapshot, at_rest
 
 QUARTER = square(0.0, 144.0, 24.0)
 ANGLE = np.linspace(0.0, np.pi / 2.0, 46)

@@ -12,10 +12,10 @@ from ..errors import FitError, InputError, SolveError
 from .collective import collective, from_root
 
 if TYPE_CHECKING:
-    from ..loop.diagnosis import Diagnosis
-    from ..loop.effects import Effect
-    from ..loop.experiment import Experiment
-    from ..loop.measurement import Measurement
+    from ..loop.inference.diagnosis import Diagnosis
+    from ..loop.inference.effects import Effect
+    from ..loop.inference.experiment import Experiment
+    from ..loop.measurement.reading import Measurement
 
 __all__ = ["diagnose"]
 
@@ -74,7 +74,7 @@ def _diagnose(
     """Rank 0 searches, which takes seconds with small systems; the others wait."""
     from mpi4py import MPI
 
-    from ..loop.effects import read_effects
+    from ..loop.inference.effects import read_effects
     from ..loop.registry import ORDER, experiment_class
     from ..terminal import searching, summarise_diagnosis
 
@@ -83,7 +83,7 @@ def _diagnose(
     for test in ORDER:
         if any(m.test == test for m in measurements):
             experiment_class(test)
-    from ..solving.record import prepare_folder
+    from ..output.record import prepare_folder
 
     def search() -> dict[str, Any]:
         own = read_effects(effects_from) if effects_from is not None else []
@@ -103,7 +103,7 @@ def _diagnose(
 
 
 def _read(folders: Sequence[Path]) -> list[Measurement]:
-    from ..loop.measurement import read_measurement
+    from ..loop.measurement.reading import read_measurement
 
     places = [folder.resolve() for folder in folders]
     for i, folder in enumerate(folders):
@@ -141,9 +141,9 @@ def _report(
     progress: Callable[[float, str], None],
 ) -> dict[str, Any]:
     """Search and write; report.json comes last."""
-    from ..loop.page import write_page
     from ..loop.registry import hand_on
-    from ..loop.report import combined_report, test_report, write_report
+    from ..loop.report.content import combined_report, test_report, write_report
+    from ..loop.report.page import write_page
 
     parts: list[tuple[Diagnosis, dict[str, Any]]] = []
     for number, (experiment, measurements) in enumerate(tests):
@@ -164,7 +164,7 @@ def _report(
 
 def _wanted(effects: str | None, tests: Sequence[Test]) -> list[str] | None:
     """The names of --effects; None for all of them."""
-    from ..rigs.keys import one_of
+    from ..inputs.keys import one_of
 
     if effects is None:
         return None
@@ -202,7 +202,7 @@ def _part(
 def _search(
     experiment: Experiment, names: Sequence[str] | None, progress: Callable[[float, str], None]
 ) -> Any:
-    from ..loop.search import diagnose_test
+    from ..loop.inference.search import diagnose_test
 
     try:
         return diagnose_test(experiment, names, progress)

@@ -19,7 +19,8 @@ def keys(
     markdown: Annotated[bool, typer.Option("--markdown", help="As tables in Markdown.")] = False,
 ) -> None:
     """Print the keys of a case file with unit, default and what is allowed."""
-    from ..rigs.keys import CASES, documented, one_of
+    from ..inputs.keys import documented, one_of
+    from ..rigs.cases import CASES
 
     if rig is not None and rig not in CASES:
         say(f"keys: {rig}, allowed is {one_of(list(CASES))}")

@@ -22,7 +22,7 @@ def new(
 ) -> None:
     """Write a commented case file: every key at its default, with unit and what is allowed."""
     from ..output.files import write_text
-    from ..rigs.keys import CASES
+    from ..rigs.cases import CASES
     from ..rigs.write_case import template
 
     listed("new", rig, CASES)

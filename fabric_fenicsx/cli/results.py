@@ -83,7 +83,7 @@ def listed(what: str, given: str, allowed: object) -> None:
     Raises:
         InputError: it is not.
     """
-    from ..rigs.keys import one_of
+    from ..inputs.keys import one_of
 
     names = list(allowed)  # type: ignore[call-overload]
     if given not in names:
@@ -97,7 +97,7 @@ def writable(path: Path, endings: tuple[str, ...]) -> Path:
         InputError: it cannot, or has another ending.
     """
     if path.suffix not in endings:
-        from ..rigs.keys import one_of
+        from ..inputs.keys import one_of
 
         raise InputError(f"{path}: allowed is a file with the ending {one_of(list(endings))}")
     try:

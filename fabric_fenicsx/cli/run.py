@@ -62,10 +62,10 @@ def _run(
 
     case = from_root(comm, lambda: load_case(path, settings))
 
+    from ..output.record import prepare_folder, write_result
     from ..rigs.common import Session
     from ..rigs.registry import RUNNERS
     from ..rigs.write_case import case_text
-    from ..solving.record import prepare_folder, write_result
     from ..terminal import following, summarise
 
     prepare_folder(folder, comm)

@@ -104,7 +104,7 @@ def _write(
     effects_from: Path | None,
 ) -> list[Hidden]:
     from ..loop import synthesise as loop
-    from ..loop.effects import read_effects
+    from ..loop.inference.effects import read_effects
 
     if not 0.0 < noise < float("inf"):
         raise InputError(f"--noise: {noise:g}, allowed is more than 0")

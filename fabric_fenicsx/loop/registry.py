@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Any
 
 from ..errors import InputError
-from ..rigs.keys import one_of
-from .diagnosis import Diagnosis
+from ..inputs.keys import one_of
+from .inference.diagnosis import Diagnosis
 
 __all__ = ["ORDER", "experiment_class", "hand_on"]
 
@@ -34,10 +33,9 @@ def experiment_class(test: str) -> Any:
     Raises:
         InputError: there is no model of this test.
     """
-    if find_spec(f"{__package__}.{test}") is None:
-        known = [name for name in ORDER if find_spec(f"{__package__}.{name}")]
-        raise InputError(f"test: {test} cannot be diagnosed, allowed is {one_of(known)}")
-    return getattr(import_module(f".{test}", __package__), CLASSES[test])
+    if test not in CLASSES:
+        raise InputError(f"test: {test} cannot be diagnosed, allowed is {one_of(ORDER)}")
+    return getattr(import_module(f".kinds.{test}.model", __package__), CLASSES[test])
 
 
 def hand_on(experiment: Any, earlier: Sequence[Diagnosis]) -> None:

@@ -16,15 +16,17 @@ import numpy.typing as npt
 import yaml
 
 from ..errors import InputError
+from ..inputs.keys import one_of
+from ..inputs.validation import suggestion
 from ..rigs.cases import CantileverCase, Case, DrapeCase, PictureFrameCase, TowKeys
-from ..rigs.keys import one_of
 from ..rigs.picture_frame import crosshead, duration
-from ..rigs.validation import suggestion
-from .drape import Drape
-from .effects import Effect, Variant
-from .experiment import Experiment
-from .fitting import orthogonal_to, weighted
-from .measurement import (
+from .inference.effects import Effect, Variant
+from .inference.experiment import Experiment
+from .inference.fitting import orthogonal_to, weighted
+from .inference.starts import SMALL
+from .kinds.drape.model import Drape
+from .kinds.drape.shear_field import ShearLaw, Solve, drape_case, solved_field
+from .measurement.reading import (
     COLUMNS,
     FILE,
     QUANTITY,
@@ -38,8 +40,6 @@ from .measurement import (
     Run,
 )
 from .registry import experiment_class
-from .shear_field import ShearLaw, Solve, drape_case, solved_field
-from .starts import SMALL
 
 __all__ = ["Hidden", "Synthetic", "parse_effect", "synthesise", "write_measurement"]
 

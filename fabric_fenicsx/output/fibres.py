@@ -21,8 +21,8 @@ import pyvista as pv
 from fabric_fenicsx.fabric.crossings import crossing_numbers, reference_angle
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import write_text
-from fabric_fenicsx.output.snapshot import Snapshot
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
+from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["FibreMap", "fibre_map"]
 

@@ -17,8 +17,8 @@ from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import replacing
 from fabric_fenicsx.output.lines import COLOURS, scale_limits, tow_lines
 from fabric_fenicsx.output.pictures import colour_map, draw_net
-from fabric_fenicsx.output.snapshot import Snapshot
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
+from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["encoder", "write_film"]
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fabric_fenicsx.fabric.net import Net
-from fabric_fenicsx.output.snapshot import Snapshot
+from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["whole_sheet"]
 

@@ -25,7 +25,7 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import write_text, write_vtk
-from fabric_fenicsx.output.snapshot import Snapshot
+from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["TimeSeries", "listed_steps", "read_step"]
 

@@ -27,8 +27,8 @@ from fabric_fenicsx.output.lines import (
     tow_spacing,
 )
 from fabric_fenicsx.output.mirror import whole_sheet
-from fabric_fenicsx.output.snapshot import Snapshot
 from fabric_fenicsx.output.surfaces import RevolvedSurface, TriangleSurface, triangulated
+from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["VIEWS", "draw_net"]
 

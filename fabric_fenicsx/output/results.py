@@ -18,7 +18,6 @@ from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import write_npz, write_vtk
 from fabric_fenicsx.output.mirror import whole_sheet
 from fabric_fenicsx.output.paraview import listed_steps, read_step
-from fabric_fenicsx.output.snapshot import Snapshot
 from fabric_fenicsx.output.surfaces import (
     OTHER_COLOUR,
     TOOL_COLOURS,
@@ -26,6 +25,7 @@ from fabric_fenicsx.output.surfaces import (
     TriangleSurface,
     triangulated,
 )
+from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["Results", "read_net", "read_results", "write_setup"]
 

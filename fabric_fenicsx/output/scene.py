@@ -24,8 +24,8 @@ from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import write_text
 from fabric_fenicsx.output.lines import COLOURS, round_step, scale_limits, tow_lines, tow_spacing
 from fabric_fenicsx.output.pictures import SEQUENTIAL
-from fabric_fenicsx.output.snapshot import Snapshot
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
+from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["SHOWN", "write_scene"]
 

@@ -14,13 +14,13 @@ import numpy.typing as npt
 from ..fabric.net import WEFT, Net
 from ..output.files import replacing
 from ..output.pictures import draw_net
-from ..output.snapshot import Snapshot
 from ..solving.model import Model, Support
-from ..solving.simulation import Run, simulate
+from ..solving.snapshot import Snapshot
 from ..solving.stepping import StepControl
 from .cases import CantileverCase
 from .common import Session, extend, fabric_model, tow_net, write_table
 from .fabrics import strip
+from .simulation import Run, simulate
 
 __all__ = ["build", "midline", "run"]
 

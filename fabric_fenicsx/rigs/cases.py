@@ -8,15 +8,16 @@ m · warp spacing · weft spacing.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import BaseModel, Field, model_validator
 
-from .groups import Keys, NotNegative, Positive
+from ..inputs.groups import Keys, NotNegative, Positive
 from .shear_law_keys import ShearLawKeys
 from .weave_keys import SheetKeys, WeaveKeys
 
 __all__ = [
+    "CASES",
     "Assumptions",
     "CantileverCase",
     "Case",
@@ -291,3 +292,8 @@ class CantileverCase(Common):
 
 
 Case = DrapeCase | PictureFrameCase | CantileverCase
+
+CASES: dict[str, type[Common]] = {
+    get_args(model.model_fields["test"].annotation)[0]: model for model in get_args(Case)
+}
+"""The model of each rig's keys, without the rigs themselves: they need dolfinx."""

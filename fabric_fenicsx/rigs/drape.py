@@ -21,12 +21,11 @@ from ..geometry.distance import DistanceGrid
 from ..geometry.triangles import read_stl
 from ..mechanics.tools import HoledPlate, Mould, Sphere, Tool
 from ..output.pictures import draw_net
-from ..output.snapshot import Snapshot
 from ..output.surfaces import tool_surface
 from ..solving.generalised_alpha import GeneralisedAlpha
 from ..solving.model import Model, Support
 from ..solving.parts import ContactLaw
-from ..solving.simulation import Run, simulate
+from ..solving.snapshot import Snapshot
 from .cases import ContactKeys, DrapeCase
 from .common import (
     Session,
@@ -38,6 +37,7 @@ from .common import (
     write_table,
 )
 from .fabrics import crossing_gap, flat_sheet
+from .simulation import Run, simulate
 from .weave_keys import crossing_weights
 
 __all__ = ["angles_at", "build", "run", "tools"]

@@ -7,10 +7,18 @@ from pathlib import Path
 from typing import Any, cast
 
 from ..errors import InputError
-from .cases import Case, DrapeCase
+from ..inputs.keys import one_of, plain
+from ..inputs.validation import (
+    Place,
+    dotted_place,
+    mistakes,
+    one_line,
+    parse_yaml,
+    read_yaml,
+    suggestion,
+)
+from .cases import CASES, Case, DrapeCase
 from .fabrics import fabrics, flat_sheet
-from .keys import CASES, one_of, plain
-from .validation import Place, dotted_place, mistakes, one_line, parse_yaml, read_yaml, suggestion
 
 __all__ = ["load_case"]
 

@@ -17,12 +17,12 @@ import numpy.typing as npt
 from ..fabric.net import Net
 from ..output.files import replacing
 from ..output.pictures import draw_net
-from ..output.snapshot import Snapshot
 from ..solving.model import Model, Support
-from ..solving.simulation import simulate
+from ..solving.snapshot import Snapshot
 from .cases import PictureFrameCase
 from .common import Session, control, extend, fabric_model, tow_net, write_table
 from .fabrics import woven_sheet
+from .simulation import simulate
 
 __all__ = ["build", "crosshead", "frame_angle", "frame_ends", "normalised_force", "run"]
 

@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from ..inputs.groups import Keys, NotNegative, Positive
 from ..mechanics import compaction, shear_friction, shear_laws
-from .groups import Keys, NotNegative, Positive
 
 __all__ = ["ShearLawKeys"]
 

@@ -15,7 +15,7 @@ from ..fabric.layout import TowLayout, spaced_layout
 from ..fabric.net import Net
 from ..fabric.outline import Circle, Outline, Polygon, rectangle
 from ..fabric.weave import WEAVES, WeavePattern, pattern_from_file
-from .groups import Keys, Positive
+from ..inputs.groups import Keys, Positive
 
 __all__ = ["SheetKeys", "WeaveKeys", "crossing_weights", "layout", "pattern"]
 

@@ -12,8 +12,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from .cases import Case
-from .keys import CASES, allowed_by, group_of, unit
+from ..inputs.keys import allowed_by, group_of, unit
+from .cases import CASES, Case
 
 __all__ = ["case_text", "template"]
 

@@ -20,13 +20,13 @@ from ..mechanics.fields import ConnectorFields, TowFields
 from ..mechanics.section_laws import with_viscosity
 from ..mechanics.terms import Term, work_term
 from ..mechanics.tools import Tool
-from ..output.snapshot import Snapshot
 from .discretisation import BLOCK, Discretisation
 from .generalised_alpha import GeneralisedAlpha
 from .history import Histories
 from .newton import Newton
 from .parts import ContactLaw, Contacts, Crossings, CrossoverLaw
 from .sections import SectionLawName, diagonals, elastic_section
+from .snapshot import Snapshot
 from .system import System
 from .update import rotate
 

@@ -21,10 +21,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from fabric_fenicsx.errors import SolveError
-from fabric_fenicsx.loop.diagnosis import Diagnosis
-from fabric_fenicsx.loop.measurement import read_measurement
+from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
+from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.measurement.reading import read_measurement
 from fabric_fenicsx.loop.registry import experiment_class
-from fabric_fenicsx.loop.search import diagnose_test
 from measurements.sets import sixty
 from measurements.writing import Truth
 

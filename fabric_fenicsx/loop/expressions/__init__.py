@@ -1,0 +1,1 @@
+"""Expressions of UFL with memory, evaluated over records together with their derivatives."""

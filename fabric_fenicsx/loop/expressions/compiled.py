@@ -1,0 +1,173 @@
+"""Expressions with memory as a compiled loop: what numpy cannot do for all points at once.
+
+The C compiler is there where dolfinx is, which compiles its forms with it. A loop is kept beside
+dolfinx's forms, under a name made of its source.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import subprocess
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...mechanics.scalars import Steps
+
+__all__ = ["march"]
+
+Array = npt.NDArray[np.float64]
+
+WRITTEN: dict[str, str] = {
+    "Sum": "{} + {}",
+    "Product": "{} * {}",
+    "Division": "{} / {}",
+    "Power": "pow({}, {})",
+    "Abs": "fabs({})",
+    "Real": "{}",
+    "Sign": "({0} > 0) - ({0} < 0)",
+    "Sqrt": "sqrt({})",
+    "Exp": "exp({})",
+    "Ln": "log({})",
+    "Sin": "sin({})",
+    "Cos": "cos({})",
+    "Tan": "tan({})",
+    "Asin": "asin({})",
+    "Acos": "acos({})",
+    "Atan": "atan({})",
+    "Atan2": "atan2({}, {})",
+    "Sinh": "sinh({})",
+    "Cosh": "cosh({})",
+    "Tanh": "tanh({})",
+    "Conditional": "{} ? {} : {}",
+    "MaxValue": "fmax({}, {})",
+    "MinValue": "fmin({}, {})",
+    "LT": "{} < {}",
+    "LE": "{} <= {}",
+    "GT": "{} > {}",
+    "GE": "{} >= {}",
+    "EQ": "{} == {}",
+    "NE": "{} != {}",
+    "AndCondition": "{} && {}",
+    "OrCondition": "{} || {}",
+    "NotCondition": "!{}",
+}
+"""What an operator of UFL is in C, by the name of its class."""
+
+FRAME = """#include <math.h>
+/* Inputs x, parameters p, memory h; M of them with partial derivatives P in x, h and p. */
+void march(long points, long records, long active, const double *x, const double *dx,
+           const double *p, const long *slot, double *h, double *dh)
+{{
+  enum {{ X = {inputs}, M = {memory}, N = {parameters} }};
+  const long size = points * records;
+  for (long r = 0; r < records; ++r)
+    for (long i = 0; i + 1 < points; ++i) {{
+      const long at = i * records + r, next = at + records;
+      double now[M], P[M][X + M + N];
+{body}
+      for (int m = 0; m < M; ++m) {{
+        h[m * size + next] = now[m];
+        for (long a = 0; a < active; ++a) {{
+          double d = 0.0;
+          for (int s = 0; s < X; ++s) d += P[m][s] * dx[(s * active + a) * size + at];
+          for (int s = 0; s < M; ++s) d += P[m][X + s] * dh[(s * active + a) * size + at];
+          dh[(m * active + a) * size + next] = d;
+        }}
+        for (int s = 0; s < N; ++s)
+          dh[(m * active + slot[s]) * size + next] += P[m][X + M + s];
+      }}
+    }}
+}}
+"""
+
+
+def march(
+    steps: Steps,
+    partials: Sequence[dict[str, int]],
+    inputs: Sequence[str],
+    memory: Sequence[str],
+    parameters: Sequence[str],
+) -> Callable[..., tuple[Array, Array]]:
+    """Compile the loop that remembers.
+
+    Args:
+        steps: the next values of the memory first, then their partial derivatives.
+        partials: for each of them, where in the steps' results the derivative in a symbol is.
+        inputs: names of the symbols given at every point.
+        memory: of those remembered.
+        parameters: of the numbers.
+
+    Returns:
+        A function of the inputs (n_inputs, n_points, n_records), their slopes
+        (n_inputs, n_active, n_points, n_records), the parameters' values and their places among
+        the active ones. It gives memory and its slopes before each point, shaped likewise.
+    """
+    places = (
+        {name: f"x[{k} * size + at]" for k, name in enumerate(inputs)}
+        | {name: f"h[{k} * size + at]" for k, name in enumerate(memory)}
+        | {name: f"p[{k}]" for k, name in enumerate(parameters)}
+    )
+    lines = []
+    for k, (operator, operands) in enumerate(steps.operations):
+        if operator == "given":
+            value = places[operands]
+        elif operator == "number":
+            value = repr(operands)
+        else:
+            value = WRITTEN[operator].format(*(f"v{i}" for i in operands))
+        lines.append(f"const double v{k} = {value};")
+    for m, own in enumerate(partials):
+        lines.append(f"now[{m}] = v{steps.results[m]};")
+        for s, name in enumerate((*inputs, *memory, *parameters)):
+            value = f"v{steps.results[own[name]]}" if name in own else "0.0"
+            lines.append(f"P[{m}][{s}] = {value};")
+    source = FRAME.format(
+        inputs=len(inputs),
+        memory=len(memory),
+        parameters=len(parameters),
+        body="\n".join("      " + line for line in lines),
+    )
+    function = ctypes.CDLL(str(_library(source))).march
+    n_memory = len(memory)
+
+    def run(x: Array, dx: Array, values: Array, slot: npt.NDArray[Any]) -> tuple[Array, Array]:
+        points, records = x.shape[1:]
+        active = dx.shape[1]
+        h = np.zeros((n_memory, points, records))
+        dh = np.zeros((n_memory, active, points, records))
+        arrays = [np.ascontiguousarray(a, dtype=float) for a in (x, dx, values)]
+        index = np.ascontiguousarray(slot, dtype=ctypes.c_long)
+        function(
+            ctypes.c_long(points),
+            ctypes.c_long(records),
+            ctypes.c_long(active),
+            *(ctypes.c_void_p(a.ctypes.data) for a in (*arrays, index, h, dh)),
+        )
+        return h, dh
+
+    return run
+
+
+def _library(source: str) -> Path:
+    """The compiled source, made where it is not there yet."""
+    cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "fabric-fenicsx"
+    name = hashlib.sha256(source.encode()).hexdigest()[:24]
+    path = cache / f"march_{name}.so"
+    if not path.exists():
+        cache.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=cache) as folder:
+            code, made = Path(folder) / "march.c", Path(folder) / "march.so"
+            code.write_text(source)
+            compiler = os.environ.get("CC", "cc")
+            options = ["-O2", "-shared", "-fPIC", "-o", str(made), str(code), "-lm"]
+            subprocess.run([compiler, *options], check=True)
+            # At once, so that another rank never sees half a file.
+            os.replace(made, path)
+    return path

@@ -1,0 +1,1 @@
+"""Cantilevered strips."""

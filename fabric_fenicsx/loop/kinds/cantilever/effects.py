@@ -1,0 +1,106 @@
+"""Effects that a cantilever shows. Curvature, moment and slope are positive where the tow bends up.
+
+``B`` is the strip's bending stiffness per width [N mm], moments are per width [N mm/mm = N].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from ufl import max_value, min_value, tanh
+
+from ...inference.effects import Effect, Parameter, StripVariant
+
+__all__ = ["CANTILEVER_EFFECTS"]
+
+YIELD = Parameter(
+    "m_s_N",
+    (0.2, 0.6),
+    0.0,
+    10.0,
+    amplitude=True,
+    meaning="moment per width that does not grow once fibres slip",
+    share_of="moment",
+)
+SLIP = Parameter(
+    "kappa_s_1_mm",
+    (0.05, 0.2, 0.6),
+    0.005,
+    3.0,
+    meaning="curvature at which they do",
+    share_of="curvature",
+)
+CUBIC = Parameter("b_N_mm3", amplitude=True, meaning="moment per width and curvature³")
+
+
+def _slipping(label: str, share: Callable[[Any], Any]) -> StripVariant:
+    """A moment m_s f(κ/κ_s) beside B κ; f is odd, has the slope 1 at zero and does not pass 1."""
+    return StripVariant(
+        label,
+        (YIELD, SLIP),
+        moment=lambda p, kappa: p["m_s_N"] * share(kappa / p["kappa_s_1_mm"]),
+    )
+
+
+CANTILEVER_EFFECTS = (
+    Effect(
+        "residual_curvature",
+        "cantilever",
+        "the sheet is not flat when unloaded",
+        (
+            StripVariant(
+                "constant",
+                (
+                    Parameter(
+                        "kappa0_1_mm", amplitude=True, meaning="curvature unloaded, up positive"
+                    ),
+                ),
+                unloaded=lambda p: p["kappa0_1_mm"],
+            ),
+        ),
+    ),
+    Effect(
+        "nonlinear_bending",
+        "cantilever",
+        "the bending moment is not linear in curvature",
+        (
+            _slipping("hyperbolic", lambda y: y / (1 + abs(y))),
+            # Beyond ±20 its derivatives, 1/cosh², would overflow on the way to zero.
+            _slipping("tanh", lambda y: tanh(max_value(min_value(y, 20), -20))),
+            _slipping("stick, then slip", lambda y: max_value(min_value(y, 1), -1)),
+            StripVariant("cubic", (CUBIC,), moment=lambda p, kappa: p["b_N_mm3"] * kappa**3),
+        ),
+    ),
+    Effect(
+        "clamp_compliance",
+        "cantilever",
+        "the clamp yields: a rotation spring at the root",
+        (
+            StripVariant(
+                "linear",
+                (
+                    Parameter(
+                        "compliance_rad_per_N",
+                        lower=0.0,
+                        amplitude=True,
+                        meaning="turn of the root per moment per width",
+                    ),
+                ),
+                slope=lambda p, root: p["compliance_rad_per_N"] * root,
+            ),
+        ),
+    ),
+    Effect(
+        "clamp_tilt",
+        "cantilever",
+        "the clamp is not horizontal",
+        (
+            StripVariant(
+                "constant",
+                (Parameter("tilt_rad", amplitude=True, meaning="slope of the clamp, up positive"),),
+                slope=lambda p, root: p["tilt_rad"],
+            ),
+        ),
+    ),
+)

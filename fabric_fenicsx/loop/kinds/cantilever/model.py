@@ -1,0 +1,381 @@
+"""Cantilevers: strips of several overhangs that hang from a clamp under their own weight.
+
+A strip is one tow of the beam model with the strip's weight over one tow spacing (loop.hanging);
+its stiffness is that of the paper's section, B = 6 C1 I per spacing, and C1 is fitted.
+
+Heights are compared: at the arc length of a reading where that is given. Where it is not, x may be
+as uncertain as z, and where the line is steep a height at x says nothing. What is compared then is
+the distance d from the predicted line along its normal, as the height that it stands for,
+
+    z - d sqrt(1 + t²),    with the weight 1/sqrt(1 + r² t²),
+
+t the tangent of the slope of a smooth line through the readings, r the scatter of x over that of z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+
+from ....errors import SolveError
+from ...expressions.marching import Marched, Varying
+from ...inference.effects import Effect, Parameter, StripVariant, Variant, scaled
+from ...inference.experiment import Law, Readings
+from ...measurement.reading import Measurement
+from .effects import CANTILEVER_EFFECTS
+from .hanging import HangingTow, Laws
+
+__all__ = ["Cantilever"]
+
+Array = npt.NDArray[np.float64]
+
+#: Loads w L³/B of the longest strip at which a start for C1 is looked for.
+LOADS = np.logspace(-2.0, 3.0, 51)
+#: C1 is looked for within this factor of its start.
+REACH = 1e3
+#: Steepest slope, as a tangent, at which a distance along the normal stands for a height.
+STEEPEST = 5.0
+#: Degree of the polynomials that smooth a measured line.
+SMOOTH = 5
+#: Readings without arc length from which their scatter is found.
+FEWEST = 12
+#: Sigmas from which a reading is not taken for scatter.
+SPIKE = 4.0
+#: Points of a law that is shown.
+LAW_POINTS = 201
+#: Points on a predicted line among which the nearest to a reading is looked for.
+FINE = 400
+
+
+@dataclass(frozen=True, slots=True)
+class _Specimen:
+    """Readings of one tow.
+
+    Attributes:
+        tow: its model.
+        rows: places of the readings, (n,).
+        s, x, z: of the readings [mm], (n,); s is NaN where it is not known.
+    """
+
+    tow: HangingTow
+    rows: npt.NDArray[np.int64]
+    s: Array
+    x: Array
+    z: Array
+
+
+class Cantilever:
+    """Cantilevers of one fabric.
+
+    Args:
+        measurements: folders of this test; they share C1.
+        own: effects of the user's.
+
+    Attributes:
+        stiffness_per_C1: bending stiffness per width over C1 of the first folder's tow [mm³].
+        scatter: r of the module's docstring, as found from the readings.
+
+    Raises:
+        SolveError: not even a stiff strip hangs.
+    """
+
+    test = "cantilever"
+    quantity = "z_mm"
+    notes = ()
+
+    def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
+        given = [m.noise for m in measurements if m.noise is not None]
+        # One sigma for all, and only where every folder states its own.
+        known = len(given) == len(measurements)
+        self.noise = float(np.sqrt(np.mean(np.square(given)))) if known else None
+        self._lay_out(measurements)
+        self._compiled: dict[tuple[int, str], Marched] = {}
+        count = len(self._run)
+        slope, self.scatter = self._measured_slopes()
+        unknown = np.isnan(self._arc)
+        self._steepness = np.where(unknown, np.minimum(np.abs(np.tan(slope)), STEEPEST), 0.0)
+        start = self._start()
+        self.stiffness_per_C1 = self._specimens[0].tow.stiffness_per_C1
+        self.baseline = (
+            Parameter(
+                "C1_MPa",
+                (start,),
+                start / REACH,
+                start * REACH,
+                meaning="Neo-Hookean constant of the tows; B = 6 C1 I over their spacing",
+            ),
+        )
+        arc, curvature, moment = self._baseline_lines(start)
+        names = [run.label or run.file for m in measurements for run in m.runs]
+        holdout = np.array([run.holdout for m in measurements for run in m.runs])
+        self.readings = Readings(
+            observed=self._observed,
+            run=self._run,
+            holdout=holdout[self._run],
+            usable=np.ones(count, dtype=bool),
+            weight=1.0 / np.sqrt(1.0 + (self.scatter * self._steepness) ** 2),
+            names=tuple(names),
+            covariates={
+                "arc length [mm]": arc,
+                "length [mm]": self._length,
+                "slope [°]": np.degrees(slope),
+            },
+        )
+        shares = {"curvature": curvature, "moment": moment}
+        self.effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
+
+    def _lay_out(self, measurements: Sequence[Measurement]) -> None:
+        """Readings in the order of runs, in a run by length and along the strip."""
+        tows: dict[tuple[float, ...], HangingTow] = {}
+        table: list[Array] = []
+        run_of: list[npt.NDArray[np.int64]] = []
+        keys: list[tuple[float, ...]] = []
+        number = 0
+        for m in measurements:
+            tow, spacing = m.fabric.tow, m.fabric.tow_spacing_mm
+            # kg/m² is 1e-9 tonne/mm².
+            weight = m.fabric.areal_density_kg_m2 * 1e-9 * m.rig.gravity_mm_s2
+            for run in m.runs:
+                c = run.columns
+                along = np.where(np.isnan(c["s_mm"]), np.hypot(c["x_mm"], c["z_mm"]), c["s_mm"])
+                order = np.lexsort([along, c["length_mm"]])
+                columns = [c[n][order] for n in ("length_mm", "s_mm", "x_mm", "z_mm")]
+                table.append(np.stack(columns))
+                run_of.append(np.full(run.count, number, dtype=np.int64))
+                number += 1
+                for length in columns[0]:
+                    key = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
+                    keys.append(key)
+                    if key not in tows:
+                        tows[key] = HangingTow(*key)
+        self._length, self._arc, x, self._observed = np.concatenate(table, axis=1)
+        self._run = np.concatenate(run_of)
+        self._specimens = []
+        for own, tow_model in tows.items():
+            rows = np.array([i for i, other in enumerate(keys) if other == own])
+            self._specimens.append(
+                _Specimen(tow_model, rows, self._arc[rows], x[rows], self._observed[rows])
+            )
+
+    # Start --------------------------------------------------------------------------------
+
+    def _start(self) -> float:
+        """C1 whose strips, the linear ones in a straight clamp, come nearest to the readings.
+
+        In units of its length such a strip depends on w L³/B alone, but for a stretch of no
+        account: one strip that softens step by step gives them all.
+        """
+        longest = max((own.tow for own in self._specimens), key=lambda tow: tow.load_per_C1)
+        lines = []
+        for load in LOADS:
+            try:
+                shape = longest.solve({"C1_MPa": longest.load_per_C1 / load}, slopes=False)
+            except SolveError:
+                break
+            lines.append(np.stack([shape.x, shape.z]) / longest.length)
+        if not lines:
+            raise SolveError(f"a strip of {longest.length:g} mm does not hang at any stiffness")
+        loads, table = LOADS[: len(lines)], np.array(lines)
+        misses = []
+        for load in loads:
+            total = 0.0
+            for own in self._specimens:
+                share = own.tow.load_per_C1 / longest.load_per_C1
+                x, z = own.tow.length * _between(np.log(loads), table, np.log(load * share))
+                total += float(np.abs(own.z - self._heights(own, x, z, {})[0]).sum())
+            misses.append(total)
+        longest.solve({"C1_MPa": longest.load_per_C1 / loads[0]}, slopes=False)
+        return float(longest.load_per_C1 / loads[int(np.argmin(misses))])
+
+    def _measured_slopes(self) -> tuple[Array, float]:
+        """Slope of the measured lines at each reading [rad], and r of the module's docstring."""
+        slope = np.zeros(len(self._run))
+        differences, shares = [], []
+        for own in self._specimens:
+            for run in np.unique(self._run[own.rows]):
+                mine = self._run[own.rows] == run
+                slope[own.rows[mine]], away = _smooth(own.x[mine], own.z[mine])
+                if np.isnan(own.s[mine]).all():
+                    # The line may not be as smooth as the polynomials: so differences, again.
+                    differences.append(away[1:-1] - (away[:-2] + away[2:]) / 2.0)
+                    at = slope[own.rows[mine]]
+                    part = np.stack([np.cos(at) ** 2, np.sin(at) ** 2], axis=1)
+                    shares.append(part[1:-1] + (part[:-2] + part[2:]) / 4.0)
+        if not shares:
+            return slope, 1.0
+        return slope, _scatter(np.concatenate(differences), np.concatenate(shares), self.noise)
+
+    def _baseline_lines(self, C1: float) -> tuple[Array, float, float]:
+        """Arc length of every reading, and the largest curvature and moment per width."""
+        arc = np.zeros(len(self._run))
+        curvatures, moments = [], []
+        for own in self._specimens:
+            shape = own.tow.solve({"C1_MPa": C1}, slopes=False)
+            arc[own.rows] = self._places(
+                own, CubicSpline(own.tow.arc, np.stack([shape.x, shape.z], axis=1))
+            )
+            curvatures.append(float(np.abs(shape.curvature).max()))
+            moments.append(curvatures[-1] * C1 * own.tow.stiffness_per_C1)
+        return arc, max(curvatures), max(moments)
+
+    # Prediction ---------------------------------------------------------------------------
+
+    def predict(
+        self, variants: Sequence[Variant], values: Mapping[str, float]
+    ) -> tuple[Array, dict[str, Array]]:
+        """Heights [mm] and their derivatives; see Experiment."""
+        mine = [v for v in variants if isinstance(v, StripVariant)]
+        laws = self._laws(mine)
+        names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
+        expected = np.zeros(len(self._run))
+        slopes = {name: np.zeros(len(self._run)) for name in names}
+        for own in self._specimens:
+            shape = own.tow.solve(values, laws)
+            heights, changes = self._heights(own, shape.x, shape.z, shape.slopes)
+            expected[own.rows] = heights
+            for name, change in changes.items():
+                slopes[name][own.rows] = change
+        return expected, slopes
+
+    def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law:
+        """Moment per width of the curvature beyond that unloaded, up to the largest one reached.
+
+        Raises:
+            SolveError: the model has no solution there.
+        """
+        mine = [v for v in variants if isinstance(v, StripVariant)]
+        laws = self._laws(mine)
+        shapes = [own.tow.solve(values, laws, slopes=False) for own in self._specimens]
+        kappa = np.linspace(0.0, max(float(np.abs(s.curvature).max()) for s in shapes), LAW_POINTS)
+        per_C1 = self.stiffness_per_C1
+        moment, slopes = values["C1_MPa"] * per_C1 * kappa, {"C1_MPa": per_C1 * kappa}
+        for own in laws.moments:
+            added = own({"kappa": Varying(kappa)}, {**values, "B": values["C1_MPa"] * per_C1})
+            moment = moment + added["moment"].value
+            for name, slope in added["moment"].slopes.items():
+                name, scale = ("C1_MPa", per_C1) if name == "B" else (name, 1.0)
+                slopes[name] = slopes.get(name, 0.0) + scale * slope
+        return Law("curvature_1_mm", "moment_N", kappa, moment, slopes)
+
+    def _heights(
+        self, own: _Specimen, x: Array, z: Array, slopes: Mapping[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        """Expected readings of a specimen and their derivatives, from those of the nodes."""
+        line = CubicSpline(own.tow.arc, np.stack([x, z], axis=1))
+        at = self._places(own, line)
+        readings = np.stack([own.x, own.z], axis=1)
+        along = line(at, 1)
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        free = np.isnan(own.s)
+        normal = np.tile([0.0, 1.0], (len(at), 1))
+        stands_for = np.sqrt(1.0 + self._steepness[own.rows[free]] ** 2)
+        normal[free] = np.stack([-along[free, 1], along[free, 0]], axis=1) * stands_for[:, None]
+        expected = own.z - np.einsum("nd,nd->n", normal, readings - line(at))
+        if not slopes:
+            return expected, {}
+        # The place on the line moves as well, but only along it; beyond the ends of the line a
+        # reading is compared with its tangent, which turns.
+        beyond = np.einsum("nd,nd->n", along, readings - line(at)) * free
+        moved = CubicSpline(own.tow.arc, np.stack(list(slopes.values())).transpose(2, 0, 1))
+        change = moved(at) + beyond[:, None, None] * moved(at, 1)
+        changes = np.einsum("nkd,nd->kn", change, normal)
+        return expected, dict(zip(slopes, changes, strict=True))
+
+    def _places(self, own: _Specimen, line: CubicSpline) -> Array:
+        """Arc length of each reading [mm]: as given, or of the nearest point of a line."""
+        free = np.isnan(own.s)
+        at = own.s.copy()
+        if free.any():
+            grid = np.linspace(0.0, own.tow.length, FINE + 1)
+            readings = np.stack([own.x[free], own.z[free]], axis=1)
+            away = np.linalg.norm(readings[:, None, :] - line(grid)[None, :, :], axis=2)
+            s = first = grid[np.argmin(away, axis=1)]
+            for _ in range(4):
+                gap, tangent, bend = line(s) - readings, line(s, 1), line(s, 2)
+                fall = np.einsum("nd,nd->n", gap, tangent)
+                rise = np.einsum("nd,nd->n", gap, bend) + np.einsum("nd,nd->n", tangent, tangent)
+                s = np.clip(s - fall / np.maximum(rise, 0.1), first - grid[1], first + grid[1])
+                s = np.clip(s, 0.0, own.tow.length)
+            at[free] = s
+        return at
+
+    def _laws(self, variants: Sequence[StripVariant]) -> Laws:
+        def those(result: str, of: str) -> list[Marched]:
+            return [self._law(v, result, of) for v in variants if getattr(v, result) is not None]
+
+        return Laws(
+            moments=those("moment", "kappa"),
+            unloaded=those("unloaded", "kappa"),
+            slopes=those("slope", "root"),
+        )
+
+    def _law(self, variant: StripVariant, result: str, of: str) -> Marched:
+        """One of a variant's expressions, with its derivatives."""
+        key = (id(variant), result)
+        if key not in self._compiled:
+            law = Marched((of,), ("B", *(p.name for p in variant.parameters)))
+            given = (law.at,) if result == "unloaded" else (law.at, law.at[of])
+            self._compiled[key] = law.define({result: getattr(variant, result)(*given)}, {})
+        return self._compiled[key]
+
+
+def _between(at: Array, table: Array, where: float) -> Array:
+    """Linear between the rows of a table at increasing places, the end ones beyond."""
+    k = int(np.clip(np.searchsorted(at, where) - 1, 0, max(len(at) - 2, 0)))
+    if len(at) == 1:
+        return table[0]
+    share = float(np.clip((where - at[k]) / (at[k + 1] - at[k]), 0.0, 1.0))
+    return (1.0 - share) * table[k] + share * table[k + 1]
+
+
+def _smooth(x: Array, z: Array) -> tuple[Array, Array]:
+    """Slope of a measured line [rad], and how far its readings are from a smooth one [mm].
+
+    The smooth line leaves the clamp at the origin; x and z are polynomials of the distance from
+    there, which is good enough an arc length for that.
+
+    Args:
+        x: of the readings [mm], (n,).
+        z: of the readings [mm], (n,).
+    """
+    far = np.hypot(x, z)
+    u = far / far.max()
+    degree = int(np.clip(len(x) // 3, 1, SMOOTH))
+    powers = np.arange(1, degree + 1)
+    basis = u[:, None] ** powers
+    fitted = np.linalg.lstsq(basis, np.stack([x, z], axis=1), rcond=None)[0]
+    along = (powers * u[:, None] ** (powers - 1)) @ fitted
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    gap = np.stack([x, z], axis=1) - basis @ fitted
+    away = gap[:, 1] * along[:, 0] - gap[:, 0] * along[:, 1]
+    return np.arctan2(along[:, 1], along[:, 0]), away
+
+
+def _scatter(differences: Array, shares: Array, noise: float | None) -> float:
+    """Scatter of x over that of z, from how readings scatter where the line is steep.
+
+    The largest that is nearly as likely as the likeliest, and no more than one: a scatter that is
+    taken for too small would pass for an effect.
+
+    Args:
+        differences: of distances from a smooth line from the mean of both neighbours' [mm], (n,).
+        shares: of the variance of z and of that of x in their variance, (n, 2).
+        noise: sigma of z [mm] where it is given.
+    """
+    if len(differences) < FEWEST:
+        return 1.0
+
+    def unlikely(ratio: float, sigma: float) -> float:
+        variance = sigma**2 * (shares @ [1.0, ratio**2] + 1e-4)
+        # A spike says nothing of the scatter.
+        return float(np.sum(np.log(variance) + np.minimum(differences**2 / variance, SPIKE**2)))
+
+    typical = 1.5 * float(np.median(np.abs(differences))) + 1e-12
+    sigmas = [noise] if noise else typical * np.logspace(-0.5, 0.5, 31)
+    ratios = np.linspace(0.0, 1.0, 11)
+    cost = np.array([min(unlikely(ratio, sigma) for sigma in sigmas) for ratio in ratios])
+    return float(ratios[cost <= cost.min() + 1.0].max())

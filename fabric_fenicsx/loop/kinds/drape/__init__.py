@@ -1,0 +1,1 @@
+"""Draped sheets."""

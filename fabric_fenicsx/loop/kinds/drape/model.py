@@ -1,0 +1,380 @@
+"""Draped sheets: angles between the tows at places on the flat sheet, against the whole model.
+
+The baseline has nothing to fit: shear law and C1 are given, or were fitted to other tests. Its
+field of angles is solved once; an effect that changes the case is solved at a few amplitudes and
+interpolated, one that moves the pattern (see drape_effects) needs no further solution:
+
+    angle(x, y) = 90° − |γ(X(x, y))|,    γ = Σ w_j(a) γ_j
+
+with X the place on the aligned sheet, γ_j the fields at the amplitudes a_j and w_j the weights of a
+piecewise cubic Hermite interpolation. Effects that change the case add up, to first order.
+
+In a flange without friction the virtual tows wave in the plane from one crossing to the next. Such
+a wave, of two spacings, says nothing of the fabric: the spacing is a choice. It is taken out of the
+fields by Shapiro's filter of order two, which keeps cubics; see ``Drape.model_scatter`` for what is
+left of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import RegularGridInterpolator
+from scipy.ndimage import gaussian_filter
+
+from ....errors import SolveError
+from ....rigs.cases import DrapeCase
+from ...expressions.marching import Marched, Varying
+from ...inference.effects import DrapeVariant, Effect, Parameter, Variant
+from ...inference.experiment import Readings
+from ...inference.noise import estimated_noise
+from ...measurement.reading import Measurement
+from .effects import DRAPE_EFFECTS
+from .shear_field import ShearField, ShearLaw, Solve, drape_case, hermite_weights, solved_field
+
+__all__ = ["Drape"]
+
+Array = npt.NDArray[np.float64]
+
+#: Cells between two crossings: of all fields, and of the one that shows what depends on it.
+MESH, OTHER_MESH = 2, 3
+#: Above this [degrees] a reading is no scatter about a right angle: all are made acute.
+OBTUSE = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Sheet:
+    """One measurement's places [mm], (n,) each, and which of all readings they are."""
+
+    measurement: Measurement
+    x: Array
+    y: Array
+    rows: npt.NDArray[np.int64]
+
+
+class Drape:
+    """Drapes of one fabric.
+
+    Args:
+        measurements: folders of this test.
+        own: effects of the user's.
+        shear: law of the crossings, from other tests or by default that of the demo.
+        C1: Neo-Hookean constant of the tows [MPa]; by default each measurement's own.
+        source: where these come from, for the report.
+        solve: from a case to its field; the finite elements.
+    """
+
+    test = "drape"
+    quantity = "angle_deg"
+    baseline: tuple[Parameter, ...] = ()
+
+    def __init__(
+        self,
+        measurements: Sequence[Measurement],
+        own: Sequence[Effect] = (),
+        *,
+        shear: ShearLaw | None = None,
+        C1: float | None = None,
+        source: str = "",
+        solve: Solve = solved_field,
+    ) -> None:
+        self.measurements = list(measurements)
+        self.effects = [*DRAPE_EFFECTS, *own]
+        self._solve = solve
+        self._fields: dict[str, ShearField] = {}
+        self._unsolved: dict[tuple[str, float], str] = {}
+        self._compiled: dict[int, Marched] = {}
+        self.use(shear, C1, source)
+
+    def use(self, shear: ShearLaw | None, C1: float | None, source: str) -> None:
+        """Take another shear law and C1, before anything has been solved.
+
+        Args:
+            shear: law of the crossings; None for that of the demo.
+            C1: Neo-Hookean constant of the tows [MPa]; None for each measurement's own.
+            source: where these come from, for the report.
+
+        Raises:
+            InputError: there is no drape of such a rig, law or C1.
+        """
+        self._shear, self._C1, self._source = shear or ShearLaw(), C1, source
+        self._shear_source = source if shear is not None else "assumed, as in demos/drape.yaml"
+        self._C1_source = source if C1 is not None else "of the measurement's tows"
+        for m in self.measurements:
+            self._case(m, {})
+
+    def take(self, fitted: Mapping[str, Mapping[str, float]]) -> None:
+        """Take what the baselines of other tests were fitted to, before anything has been solved.
+
+        Args:
+            fitted: parameters by test; of a picture frame k1_N, k3_N and c1_N_s are taken, of a
+                cantilever C1_MPa. A negative part of the shear law is left out.
+        """
+        shear, C1 = None, None
+        if "picture_frame" in fitted:
+            parts = (fitted["picture_frame"][name] for name in ("k1_N", "k3_N", "c1_N_s"))
+            shear = ShearLaw(*(max(part, 0.0) for part in parts))
+        if "cantilever" in fitted:
+            C1 = fitted["cantilever"]["C1_MPa"]
+        self.use(shear, C1, "fitted to the other tests")
+
+    # Data ---------------------------------------------------------------------------------
+
+    @cached_property
+    def sigma(self) -> Array:
+        """One sigma of every reading [degrees], NaN where it is not given, (n,)."""
+        parts: list[Array] = []
+        for m in self.measurements:
+            for run in m.runs:
+                given = np.full(run.count, np.nan if m.noise is None else m.noise)
+                parts.append(run.columns.get("std_deg", given)[self._order[len(parts)]])
+        return np.concatenate(parts)
+
+    @cached_property
+    def noise(self) -> float | None:
+        """Root mean square of the given sigmas [degrees]; None unless all are given."""
+        if np.isnan(self.sigma).any():
+            return None
+        return float(np.sqrt(np.mean(self.sigma**2)))
+
+    @cached_property
+    def _order(self) -> list[npt.NDArray[np.int64]]:
+        """Rows of each run's file, from one place to the nearest that is left."""
+        runs = [run.columns for m in self.measurements for run in m.runs]
+        return [nearest_next(c["x_mm"], c["y_mm"]) for c in runs]
+
+    def _column(self, name: str) -> Array:
+        """A column of all runs, in their order."""
+        runs = [run.columns for m in self.measurements for run in m.runs]
+        return np.concatenate([c[name][o] for c, o in zip(runs, self._order, strict=True)])
+
+    @cached_property
+    def _sheets(self) -> list[_Sheet]:
+        x, y = self._column("x_mm"), self._column("y_mm")
+        found, start = [], 0
+        for m in self.measurements:
+            rows = np.arange(start, start + sum(run.count for run in m.runs))
+            found.append(_Sheet(m, x[rows], y[rows], rows))
+            start += len(rows)
+        return found
+
+    @cached_property
+    def readings(self) -> Readings:
+        """The data. The first call solves the baseline on two meshes.
+
+        Raises:
+            SolveError: a drape stopped before its end.
+        """
+        runs = [run for m in self.measurements for run in m.runs]
+        counts = [run.count for run in runs]
+        angle = self._column("angle_deg")
+        if angle.max() > OBTUSE:
+            angle = 90.0 - np.abs(90.0 - angle)
+        x, y = self._column("x_mm"), self._column("y_mm")
+        readings = Readings(
+            observed=angle,
+            run=np.repeat(np.arange(len(runs)), counts),
+            holdout=np.repeat([run.holdout for run in runs], counts),
+            usable=np.ones(len(angle), dtype=bool),
+            weight=np.ones(len(angle)),
+            names=tuple(run.label or run.file for run in runs),
+            covariates={
+                "distance from the axis [mm]": np.hypot(x, y),
+                "direction from the warp [°]": np.degrees(np.arctan2(x, y)),
+                "x [mm]": x,
+                "y [mm]": y,
+            },
+            row=np.concatenate(self._order),
+        )
+        sigma = self.sigma
+        noise = self.noise
+        if noise is None:
+            residual = angle - self.predict((), {})[0]
+            noise = estimated_noise(residual, readings, readings.fit)
+            sigma = np.where(np.isnan(sigma), noise, sigma)
+        weight = noise / np.hypot(sigma, self.model_scatter)
+        return replace(readings, weight=weight)
+
+    @cached_property
+    def model_scatter(self) -> Array:
+        """By how much the model itself is uncertain at each reading [degrees], (n,).
+
+        Two meshes of the baseline, with their waves of two spacings, scatter about the filtered
+        field of the first: the root mean square of that over the crossings around a place. Its
+        square is added to the variance of a reading, so that a place about which the model has
+        nothing certain to say does not decide.
+
+        That is less than a treatment of model error: such errors are alike at neighbouring places
+        and do not average out with many readings, so that standard errors and p-values are still
+        too small; and what both meshes have in common (the fabric's laws, the size of the sheet,
+        the spacing) they cannot show.
+        """
+        scatter = np.zeros(len(self.sigma))
+        for sheet in self._sheets:
+            fine = {"sheet.subdivisions": OTHER_MESH}
+            mean = self._field(sheet.measurement, {}).gamma
+            raw = [self._raw(sheet.measurement, changes) for changes in ({}, fine)]
+            # The sign of γ changes across the axes: compared is what is read.
+            off = [np.degrees(np.abs(f.gamma) - np.abs(mean)) for f in raw]
+            square = gaussian_filter(np.mean(np.square(off), axis=0), 1.0, mode="nearest")
+            # Linear between crossings: a square must not overshoot below zero.
+            x, y = raw[0].x, raw[0].y
+            places = np.column_stack([np.clip(sheet.x, x[0], x[-1]), np.clip(sheet.y, y[0], y[-1])])
+            scatter[sheet.rows] = np.sqrt(RegularGridInterpolator((x, y), square)(places))
+        return scatter
+
+    @property
+    def notes(self) -> list[str]:
+        """What a report must say of the model."""
+        law = self._shear
+        tows = {m.fabric.tow.C1_MPa if self._C1 is None else self._C1 for m in self.measurements}
+        C1 = ", ".join(f"{value:.6g}" for value in sorted(tows))
+        scatter = float(np.sqrt(np.mean(self.model_scatter**2)))
+        return [
+            f"Shear law m = {law.k1:.4g} γ + {law.k3:.4g} γ³ + {law.c1:.4g} dγ/dt N/mm "
+            f"({self._shear_source}).",
+            f"C1 = {C1} MPa ({self._C1_source}).",
+            f"The model's own scatter, from two meshes, is {scatter:.2g} degrees rms at these "
+            "places. Readings are weighted with it and errors are weighted errors: one as large "
+            "as the noise means a misfit of noise and model scatter together.",
+            *(f"{n} = {a:g}: {why}; left out." for (n, a), why in self._unsolved.items()),
+        ]
+
+    # Model --------------------------------------------------------------------------------
+
+    def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
+        """None: angles on a sheet are on no curve; see Experiment."""
+
+    def predict(
+        self, variants: Sequence[Variant], values: Mapping[str, float]
+    ) -> tuple[Array, dict[str, Array]]:
+        """Angles [degrees] and their derivatives; see Experiment."""
+        # Offset before rotation, whichever was found first: marks keep to the tools' axes.
+        place = {id(v): k for k, v in enumerate(v for e in self.effects for v in e.variants)}
+        mine = [v for v in variants if isinstance(v, DrapeVariant)]
+        mine.sort(key=lambda v: place.get(id(v), len(place)))
+        names = [p.name for v in mine for p in v.parameters]
+        expected = np.zeros(len(self.sigma))
+        slopes = {name: np.zeros(len(expected)) for name in names}
+        for sheet in self._sheets:
+            at = self._places(sheet, mine, values)
+            total = np.zeros((3, len(sheet.x)))
+            changed: dict[str, Array] = {}
+            for field, weight, by in self._mixture(sheet.measurement, mine, values):
+                parts = np.stack(field.at(at["x"].value[0], at["y"].value[0]))
+                total += weight * parts
+                for name, slope in by.items():
+                    changed[name] = changed.get(name, 0.0) + slope * parts[0]
+            gamma, along_x, along_y = total
+            to_angle = -np.degrees(np.sign(gamma))
+            expected[sheet.rows] = 90.0 - np.degrees(np.abs(gamma))
+            for name in names:
+                slope = changed.get(name, np.zeros_like(gamma))
+                for axis, gradient in (("x", along_x), ("y", along_y)):
+                    if name in at[axis].slopes:
+                        slope = slope + gradient * np.ravel(at[axis].slopes[name])
+                slopes[name][sheet.rows] = to_angle * slope
+        return expected, slopes
+
+    def _places(
+        self, sheet: _Sheet, variants: Sequence[DrapeVariant], values: Mapping[str, float]
+    ) -> dict[str, Varying]:
+        """Where on the aligned sheet the tows lie that are read, with derivatives."""
+        at = {"x": Varying(sheet.x[None, :]), "y": Varying(sheet.y[None, :])}
+        for variant in variants:
+            if variant.places is None:
+                continue
+            key = id(variant)
+            if key not in self._compiled:
+                marched = Marched(("x", "y"), tuple(p.name for p in variant.parameters))
+                x, y = variant.places(marched.at, marched.at["x"], marched.at["y"])
+                self._compiled[key] = marched.define({"x": x, "y": y}, {})
+            at = self._compiled[key](at, values)
+        return at
+
+    def _mixture(
+        self, m: Measurement, variants: Sequence[DrapeVariant], values: Mapping[str, float]
+    ) -> list[tuple[ShearField, float, dict[str, float]]]:
+        """Fields with their weights and the weights' derivatives by parameter."""
+        base = 1.0
+        base_slopes: dict[str, float] = {}
+        found: list[tuple[ShearField, float, dict[str, float]]] = []
+        for variant in variants:
+            if variant.changes is None:
+                continue
+            name = variant.parameters[0].name
+            nodes, weights, by = self._solved_weights(m, variant, values[name])
+            for node, weight, slope in zip(nodes, weights, by, strict=True):
+                if node == 0.0:
+                    base += weight - 1.0
+                    base_slopes[name] = slope
+                else:
+                    field = self._field(m, variant.changes(node))
+                    found.append((field, weight, {name: slope}))
+            if 0.0 not in nodes:
+                base -= 1.0
+        return [(self._field(m, {}), base, base_slopes), *found]
+
+    def _solved_weights(
+        self, m: Measurement, variant: DrapeVariant, value: float
+    ) -> tuple[list[float], list[float], list[float]]:
+        """hermite_weights of the amplitudes that have a solution; those needed are solved.
+
+        Raises:
+            SolveError: none of them has one.
+        """
+        assert variant.changes is not None
+        name = variant.parameters[0].name
+        while True:
+            left = [a for a in variant.solved_at if (name, a) not in self._unsolved]
+            if not left:
+                raise SolveError(f"no drape with {name} runs to its end")
+            found = hermite_weights(left, value)
+            for node in found[0]:
+                if node == 0.0:
+                    continue
+                try:
+                    self._field(m, variant.changes(node))
+                except SolveError as error:
+                    self._unsolved[name, node] = str(error)
+                    break
+            else:
+                return found
+
+    def _field(self, m: Measurement, changes: Mapping[str, Any]) -> ShearField:
+        raw = self._raw(m, changes)
+        key = f"filtered {id(raw)}"
+        if key not in self._fields:
+            self._fields[key] = raw.filtered()
+        return self._fields[key]
+
+    def _raw(self, m: Measurement, changes: Mapping[str, Any]) -> ShearField:
+        """The field of a changed case, solved once."""
+        case = self._case(m, changes)
+        key = case.model_dump_json()
+        if key not in self._fields:
+            self._fields[key] = self._solve(case)
+        return self._fields[key]
+
+    def _case(self, m: Measurement, changes: Mapping[str, Any]) -> DrapeCase:
+        C1 = m.fabric.tow.C1_MPa if self._C1 is None else self._C1
+        return drape_case(m, self._shear, C1, {"sheet.subdivisions": MESH, **changes})
+
+
+def nearest_next(x: Array, y: Array) -> npt.NDArray[np.int64]:
+    """An order of places, (n,), in which each is followed by the nearest of those left.
+
+    It begins with the outermost. So stretches of readings are parts of the sheet.
+    """
+    left = np.arange(len(x))
+    order = [int(np.argmax(np.hypot(x, y)))]
+    while len(order) < len(x):
+        left = left[left != order[-1]]
+        away = np.hypot(x[left] - x[order[-1]], y[left] - y[order[-1]])
+        order.append(int(left[np.argmin(away)]))
+    return np.array(order, dtype=np.int64)

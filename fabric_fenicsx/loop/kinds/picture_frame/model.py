@@ -1,0 +1,334 @@
+"""A picture frame as one crossing in affine shear, reading by reading.
+
+The tows of a frame turn with its bars, so every crossing has the frame's angle and the moment of
+the whole net is that of one crossing times their number. With m per area of fabric,
+
+    D = L (2 cos θ − √2),    θ = π/4 − γ/2,    F = m(γ, γ̇, ...) L_fabric² / (L sin θ)
+
+from the virtual work F dD = m L_fabric² dγ. The laws are those of mechanics.shear_laws, the same
+objects that the whole net takes; how far tows that bend between crossings leave this is tested.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from math import pi, sqrt
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from ufl import acos, sin
+
+from ....mechanics.scalars import derivative_of
+from ....mechanics.shear_laws import Crossing, LinearDashpot, PolynomialSpring
+from ...expressions.marching import Marched, Varying
+from ...inference.effects import Effect, FrameVariant, Parameter, Variant, scaled
+from ...inference.experiment import Readings
+from ...inference.noise import estimated_noise
+from ...measurement.reading import Measurement
+from .effects import PICTURE_FRAME_EFFECTS
+from .motion import Programme, frame_programme
+
+__all__ = ["PictureFrame"]
+
+Array = npt.NDArray[np.float64]
+
+BASELINE = (
+    Parameter("k1_N", (0.0,), meaning="spring, moment per area and angle"),
+    Parameter("k3_N", (0.0,), meaning="spring, moment per area and angle³"),
+    Parameter("c1_N_s", (0.0,), meaning="dashpot, moment per area and rate"),
+)
+
+
+class PictureFrame:
+    """Picture frames of one fabric.
+
+    Args:
+        measurements: folders of this test; they share the parameters of the fabric.
+        own: effects of the user's.
+    """
+
+    test = "picture_frame"
+    quantity = "force_N"
+    baseline = BASELINE
+    notes = ()
+
+    def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
+        self.noise = _common_noise(measurements)
+        runs = [(m, run) for m in measurements for run in m.runs]
+        programmes = [
+            frame_programme(
+                run.columns["time_s"], run.columns["displacement_mm"], m.rig.frame_length_mm
+            )
+            for m, run in runs
+        ]
+        self._lay_out(programmes)
+        self._rig = {
+            "frame": Varying(np.array([[m.rig.frame_length_mm for m, _ in runs]])),
+            "fabric": Varying(np.array([[m.rig.fabric_length_mm for m, _ in runs]])),
+        }
+        self._compiled: dict[int, Marched] = {}
+        kinematics = self._kinematics(self._travel(None, {}), {})
+        gamma, rate = (self._at_readings(kinematics[key].value) for key in ("gamma", "rate"))
+        time = self._at_readings(self._points["time"].value)
+        self.readings = Readings(
+            observed=np.concatenate([run.columns["force_N"] for _, run in runs]),
+            run=np.repeat(np.arange(len(runs)), [run.count for _, run in runs]),
+            holdout=np.repeat([run.holdout for _, run in runs], [run.count for _, run in runs]),
+            usable=np.concatenate([p.certain for p in programmes]),
+            weight=np.ones(sum(run.count for _, run in runs)),
+            names=tuple(run.label or run.file for _, run in runs),
+            covariates={
+                "shear angle [°]": np.degrees(gamma),
+                "shear rate [°/s]": np.degrees(rate),
+                "time [s]": time,
+            },
+        )
+        doubt = np.concatenate([p.doubt for p in programmes])
+        self._leave_out_uncertain(doubt * self._at_readings(kinematics["rate_per_speed"].value))
+        shares = {
+            "duration": max(float(p.time[-1] - p.time[0]) for p in programmes),
+            "angle": float(np.abs(gamma).max()),
+            "rate": float(np.abs(rate).max()),
+            "travel": float(np.abs(self._points["D"].value).max()),
+        }
+        self.effects = [self._with_runs(scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
+
+    def _leave_out_uncertain(self, doubt: Array) -> None:
+        """Leave out readings whose rate is so uncertain [rad/s] that the dashpot's force is.
+
+        By more than a reading scatters, with the dashpot of a first fit, which also says how much
+        that is where it is not given; never more than half.
+        """
+        rows = self.readings.fit
+        _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
+        J = np.column_stack([slopes[p.name] for p in self.baseline])
+        if rows.sum() <= len(self.baseline):
+            return
+        k = np.linalg.lstsq(J[rows], self.readings.observed[rows], rcond=None)[0]
+        residual = self.readings.observed - J @ k
+        noise = self.noise or estimated_noise(residual, self.readings, rows)
+        factor = self._at_readings(self._kinematics(self._travel(None, {}), {})["factor"].value)
+        # Where nothing is known of the rate the programme has left the reading out itself.
+        doubt = np.where(np.isfinite(doubt), doubt, 0.0)
+        clear = ~(np.abs(k[-1] * factor * doubt) >= noise)
+        if (rows & clear).sum() > rows.sum() / 2:
+            self.readings = replace(self.readings, usable=self.readings.usable & clear)
+
+    def _lay_out(self, programmes: Sequence[Programme]) -> None:
+        """Records side by side; the shorter ones rest at their last point."""
+        longest = max(len(p.time) for p in programmes)
+        shape = (longest, len(programmes))
+        time, D, rate = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+        places = []
+        for r, p in enumerate(programmes):
+            count = len(p.time)
+            time[:count, r], D[:count, r], rate[:count, r] = p.time, p.displacement, p.rate
+            time[count:, r] = p.time[-1] + np.arange(1, longest - count + 1)
+            D[count:, r] = p.displacement[-1]
+            rows = np.flatnonzero(p.reading >= 0)
+            places.append((rows[np.argsort(p.reading[rows])], np.full(len(p.certain), r)))
+        self._place = tuple(np.concatenate(part) for part in zip(*places, strict=True))
+        step = np.diff(time, axis=0, prepend=time[:1] - 1.0)
+        self._points = {
+            "time": Varying(time),
+            "D": Varying(D),
+            "D_rate": Varying(rate),
+            "per_time": Varying(1.0 / step),
+        }
+
+    def _at_readings(self, values: Array) -> Array:
+        return np.broadcast_to(values, self._points["D"].value.shape)[self._place]
+
+    def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
+        """None: the moment depends on the angle, its rate and its past; see Experiment."""
+
+    def predict(
+        self, variants: Sequence[Variant], values: Mapping[str, float]
+    ) -> tuple[Array, dict[str, Array]]:
+        """Crosshead forces [N] and their derivatives; see Experiment."""
+        mine = [v for v in variants if isinstance(v, FrameVariant)]
+        travels = [v for v in mine if v.travel is not None]
+        travel = self._travel(travels[0] if travels else None, values)
+        known = self._kinematics(travel, values)
+        moments = [self._moment(None, known, values)]
+        moments += [self._moment(v, known, values) for v in mine if v.laws is not None]
+        factor = known["factor"]
+        force = sum(m.value for m in moments) * factor.value
+        slopes: dict[str, Any] = {}
+        for m in moments:
+            for p, slope in m.slopes.items():
+                slopes[p] = slopes.get(p, 0.0) + slope * factor.value
+            for p, slope in factor.slopes.items():
+                slopes[p] = slopes.get(p, 0.0) + m.value * slope
+        for v in mine:
+            if v.reading is not None:
+                added = self._each_run(v, values, force) if v.each_run else self._reading(v, values)
+                force = force + added.value
+                for p, slope in added.slopes.items():
+                    slopes[p] = slopes.get(p, 0.0) + slope
+        names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
+        zero = np.zeros(len(self._place[0]))
+        return self._at_readings(force), {
+            name: self._at_readings(slopes[name]) if name in slopes else zero for name in names
+        }
+
+    def _travel(self, variant: FrameVariant | None, values: Mapping[str, float]) -> Any:
+        """True displacement of the frame, and its rate."""
+        if variant is None or variant.travel is None:
+            return {"D": self._points["D"], "D_rate": self._points["D_rate"]}
+        key = id(variant)
+        if key not in self._compiled:
+            marched = Marched(("D", "D_rate"), tuple(p.name for p in variant.parameters))
+            past = marched.remembered("D") if variant.remembers_travel else None
+            true = variant.travel(marched.at, marched.at["D"], past)
+            rate = derivative_of(true, marched.at["D"]) * marched.at["D_rate"]
+            history = {"D": true} if variant.remembers_travel else {}
+            self._compiled[key] = marched.define({"D": true, "D_rate": rate}, history)
+        return self._compiled[key](self._points, values)
+
+    def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
+        """γ at each point and at the one before, γ̇, and force per moment."""
+        if 0 not in self._compiled:
+            marched = Marched(("D", "D_rate", "frame", "fabric"), ())
+            at = marched.at
+            theta = acos((sqrt(2.0) + at["D"] / at["frame"]) / 2)
+            gamma = pi / 2 - 2 * theta
+            outputs = {
+                "gamma": gamma,
+                "rate": derivative_of(gamma, at["D"]) * at["D_rate"],
+                "rate_per_speed": derivative_of(gamma, at["D"]),
+                "factor": at["fabric"] ** 2 / (at["frame"] * sin(theta)),
+            }
+            self._compiled[0] = marched.define(outputs, {})
+        shape = travel["D"].value.shape
+        rig = {name: Varying(np.broadcast_to(v.value, shape)) for name, v in self._rig.items()}
+        known = self._compiled[0]({**travel, **rig}, values)
+        gamma = known["gamma"]
+        before = Varying(_shifted(gamma.value), {p: _shifted(s) for p, s in gamma.slopes.items()})
+        return {**known, "gamma_n": before, "per_time": self._points["per_time"]}
+
+    def _moment(
+        self, variant: FrameVariant | None, known: dict[str, Varying], values: Mapping[str, float]
+    ) -> Varying:
+        """Moment per area [N] of the baseline or of an effect."""
+        key = 1 if variant is None else id(variant)
+        if key not in self._compiled:
+            parameters = self.baseline if variant is None else variant.parameters
+            marched = Marched(
+                ("gamma", "gamma_n", "rate", "per_time"), tuple(p.name for p in parameters)
+            )
+            at, p = marched.at, marched.at
+            if variant is None:
+                laws: tuple[Any, ...] = (
+                    PolynomialSpring({1: p["k1_N"], 3: p["k3_N"]}),
+                    LinearDashpot(p["c1_N_s"]),
+                )
+            else:
+                assert variant.laws is not None
+                laws = variant.laws(p)
+            moment: Any = 0.0
+            history: dict[str, Any] = {}
+            for k, law in enumerate(laws):
+                crossing = Crossing(
+                    at["gamma"],
+                    at["gamma_n"],
+                    at["per_time"],
+                    lambda value: value,
+                    partial(_remembered, marched, k),
+                    at["rate"],
+                )
+                moment = moment + law.moment(crossing)
+                history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
+            self._compiled[key] = marched.define({"moment": moment}, history)
+        return self._compiled[key](known, values)["moment"]
+
+    def _reading(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
+        key = id(variant)
+        if key not in self._compiled:
+            assert variant.reading is not None
+            marched = Marched(("time",), tuple(p.name for p in variant.parameters))
+            added = variant.reading(marched.at, marched.at["time"])
+            self._compiled[key] = marched.define({"force": added}, {})
+        return self._compiled[key](self._points, values)["force"]
+
+    def _with_runs(self, effect: Effect) -> Effect:
+        """Parameters of their own for each run that is fitted, where a form wants them."""
+        runs = np.unique(self.readings.run[self.readings.fit])
+
+        def expanded(v: Variant) -> Variant:
+            if not (isinstance(v, FrameVariant) and v.each_run):
+                return v
+            own = ((p, int(run)) for run in runs for p in v.parameters)
+            return replace(
+                v, parameters=tuple(replace(p, name=_of_run(p, run), run=run) for p, run in own)
+            )
+
+        each = [v for v in effect.variants if getattr(v, "each_run", False)]
+        shared = [v for v in effect.variants if v not in each]
+        if len(self.readings.names) == 1:
+            each = []
+        elif each and len(runs) == 1:
+            # One fitted run cannot tell the two apart: nothing is claimed of the other runs.
+            shared = [v for v in shared if getattr(v, "reading", None) is None]
+        return replace(effect, variants=tuple(expanded(v) for v in (*shared, *each)))
+
+    def _each_run(
+        self, variant: FrameVariant, values: Mapping[str, float], force: Array
+    ) -> Varying:
+        """What the load cell adds; in a run that is not fitted, what fits best to what is left."""
+        assert variant.reading is not None
+        names = dict.fromkeys(p.name.split("_", 1)[1] for p in variant.parameters)
+        # The form's, not the variant's, which may have parameters of fewer runs.
+        key = id(variant.reading)
+        if key not in self._compiled:
+            unit = Marched(("time",), tuple(names))
+            added = variant.reading(unit.at, unit.at["time"])
+            self._compiled[key] = unit.define({"force": added}, {})
+        added = self._compiled[key](self._points, dict.fromkeys(names, 0.0))["force"]
+        columns = added.slopes
+        shape = self._points["time"].value.shape
+        total, found = np.zeros(shape), {}
+        left = self.readings.observed - self._at_readings(force)
+        for run in range(shape[1]):
+            rows = self.readings.run == run
+            own = {n: np.broadcast_to(c, shape)[:, run] for n, c in columns.items()}
+            if f"run{run + 1}_{next(iter(names))}" in values:
+                for n, column in own.items():
+                    name = f"run{run + 1}_{n}"
+                    total[:, run] += values[name] * column
+                    found[name] = np.zeros(shape)
+                    found[name][:, run] = column
+            else:
+                rows = rows & self.readings.usable
+                J = np.column_stack(
+                    [self._at_readings(np.broadcast_to(c, shape))[rows] for c in columns.values()]
+                )
+                zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
+                total[:, run] = sum(z * c for z, c in zip(zero, own.values(), strict=True))
+        return Varying(total, found)
+
+
+def _of_run(p: Parameter, run: int) -> str:
+    """Name of a parameter in one run, counted from 1."""
+    return f"run{run + 1}_{p.name}"
+
+
+def _remembered(marched: Marched, number: int, name: str) -> Any:
+    """A memory of one of several laws, which may use the same names."""
+    return marched.remembered(f"{number} {name}")
+
+
+def _shifted(values: Array) -> Array:
+    """At the point before; at the first point the value there."""
+    return np.concatenate([values[:1], values[:-1]])
+
+
+def _common_noise(measurements: Sequence[Measurement]) -> float | None:
+    """The sigma that all folders give; None unless they all do."""
+    given = [m.noise for m in measurements if m.noise is not None]
+    if len(given) < len(measurements):
+        return None
+    return float(np.sqrt(np.mean(np.square(given))))

@@ -1,0 +1,1 @@
+"""Measured data as a user hands it over."""

@@ -1,0 +1,1 @@
+"""What is handed back: report.json, report.html and their figures."""

@@ -1,0 +1,274 @@
+"""What is handed back: report.json, schema fabric-report/1.
+
+The keys of the contract come first; what else is there (how noise and held-out errors were come
+by, what was left out, what cannot be told apart, what to measure next) is for the page beside it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...inputs.keys import UNITS, one_of
+from ..inference.diagnosis import Diagnosis
+from ..inference.effects import Effect, Parameter, Variant
+from ..inference.fitting import Fit, parameters_of
+from ..inference.judge import STATED
+from ..measurement.reading import Measurement
+from .advice import further_test
+
+__all__ = ["SCHEMA", "combined_report", "headline", "parameter_unit", "test_report", "write_report"]
+
+SCHEMA = "fabric-report/1"
+
+PARAMETER_UNITS = {
+    "N_s_n": "N sⁿ",
+    "1_rad2": "1/rad²",
+    "rad_per_N": "rad/N",
+    "N_mm3": "N mm³",
+    "1_mm": "1/mm",
+    "rad_s": "rad/s",
+    "rad": "rad",
+    "N_s": "N s",
+}
+OTHER_UNITS = {"drift_N_s": "N/s"}
+"""A drift's unit is written like a dashpot's."""
+
+
+def parameter_unit(name: str) -> str:
+    """Unit that stands at the end of a parameter's name; empty if there is none."""
+    if name in OTHER_UNITS:
+        return OTHER_UNITS[name]
+    endings = PARAMETER_UNITS | UNITS
+    return next((text for end, text in endings.items() if name.endswith("_" + end)), "")
+
+
+def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> dict[str, Any]:
+    """The report of one test.
+
+    Args:
+        diagnosis: what was found.
+        measurements: the folders that were read, in the order of the experiment's runs.
+
+    Returns:
+        The content of report.json; a number that is not finite is None.
+    """
+    d, noise = diagnosis, diagnosis.noise
+    rows = d.baseline.used
+    content = {
+        "schema": SCHEMA,
+        "test": d.experiment.test,
+        "verdict": d.verdict,
+        "effects": [_effect(d, effect) for effect in d.effects],
+        "candidates": [
+            {
+                "name": c.effect.name,
+                "score": c.score,
+                "p_value": c.p_value,
+                "error_fit": c.fit.rms(rows) if c.fit else None,
+                "error_holdout": c.holdout,
+            }
+            for c in d.candidates
+        ],
+        "baseline": {"parameters": d.baseline.values, "std": _std(d, d.baseline)},
+        "error": {
+            "quantity": d.experiment.quantity,
+            "before": {"fit": d.baseline.rms(rows), "holdout": d.holdout_before},
+            "after": {"fit": d.final.rms(rows), "holdout": d.holdout_after},
+            "noise": noise,
+        },
+        "noise_source": d.noise_source,
+        "holdout_source": d.holdout_source,
+        "model": _numbers(d, d.final, d.holdout_after),
+        "best": None if d.best is None else _numbers(d, d.best, d.holdout_best),
+        "further_tests": _further_tests(d),
+        "identifiability": {
+            "correlated": [list(pair) for pair in d.final.correlated],
+            "at_bound": list(d.final.at_bound),
+        },
+        "left_out": _left_out(d, measurements),
+        "whiteness": {"before": asdict(d.white_before), "after": asdict(d.white_after)},
+        "parameters": {
+            p.name: {"unit": parameter_unit(p.name), "meaning": p.meaning} for p in _parameters(d)
+        },
+        "measurements": [
+            {
+                "folder": str(m.folder),
+                "title": m.title,
+                "runs": [
+                    {
+                        "file": run.file,
+                        "label": run.label,
+                        "role": "holdout" if run.holdout else "fit",
+                        "readings": run.count,
+                    }
+                    for run in m.runs
+                ],
+            }
+            for m in measurements
+        ],
+        "notes": list(d.notes),
+    }
+    finite: dict[str, Any] = _finite(content)
+    return finite | {"headline": headline(finite)}
+
+
+def combined_report(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """One report of several tests: the last one's, with each test's in ``tests``."""
+    if len(reports) == 1:
+        return reports[0]
+    return reports[-1] | {"tests": {report["test"]: report for report in reports}}
+
+
+def write_report(folder: Path, report: Mapping[str, Any]) -> None:
+    """Write report.json at once, so that nobody sees half of it.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    path = folder / "report.json"
+    partial = folder / "report.json.partial"
+    text = json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False)
+    partial.write_text(text + "\n", encoding="utf-8")
+    os.replace(partial, path)
+
+
+def headline(report: Mapping[str, Any]) -> str:
+    """The verdict in one or two plain sentences."""
+    error = report["error"]
+    unit = parameter_unit(error["quantity"])
+
+    def value(number: float | None) -> str:
+        return "unknown" if number is None else f"{number:.2g} {unit}"
+
+    before, after = (value(error[when]["holdout"]) for when in ("before", "after"))
+    scatter = f"a reading scatters by {value(error['noise'])}"
+    if report["verdict"] == "no_effect":
+        return (
+            "The baseline model explains the data, no effect has to be added: "
+            f"held-out error {before}; {scatter}."
+        )
+    if report["verdict"] == "effect_found":
+        names = " and ".join(effect["name"] for effect in report["effects"])
+        verb = "explain" if len(report["effects"]) > 1 else "explains"
+        text = (
+            f"{names} {verb} the residual: held-out error {before} before, {after} after; "
+            f"{scatter}."
+        )
+        for effect in report["effects"]:
+            if effect["rivals"]:
+                text += f" This data cannot tell {effect['name']} from {one_of(effect['rivals'])}."
+        return text
+    nor = "and no known effect explains it, nor does a pair of them"
+    text = f"The residual is not noise, {nor}: held-out error {before}; {scatter}."
+    fitted = error["before"]["fit"]
+    if fitted is not None and fitted <= STATED * error["noise"]:
+        text = (
+            "The fitted readings are what the baseline says within their noise, the held-out ones "
+            f"are not, {nor}: error {value(fitted)} and {before}; {scatter}."
+        )
+    best = report["best"]
+    if best is not None and best["effects"]:
+        names = " and ".join(effect["name"] for effect in best["effects"])
+        text += f" Nearest came {names}, with {value(best['error_fit'])} left in the fitted runs."
+    return text
+
+
+def _effect(d: Diagnosis, effect: Effect) -> dict[str, Any]:
+    variant = next(v for v in d.final.variants if _is_form(v, effect))
+    rivals = d.rivals.get(effect.name, [])
+    return _form(d, d.final, effect, variant) | {"rivals": list(rivals)}
+
+
+def _form(d: Diagnosis, model: Fit, effect: Effect, variant: Variant) -> dict[str, Any]:
+    std = _std(d, model)
+    names = [p.name for p in variant.parameters]
+    return {
+        "name": effect.name,
+        "parameters": {name: model.values[name] for name in names},
+        "std": {name: std[name] for name in names},
+        "variant": variant.label,
+        "meaning": effect.meaning,
+    }
+
+
+def _std(d: Diagnosis, model: Fit) -> dict[str, float | None]:
+    """Standard errors; None of a parameter on a bound, where there is none."""
+    return {
+        name: None if name in model.at_bound else value
+        for name, value in model.errors_at(d.noise).items()
+    }
+
+
+def _is_form(variant: Variant, effect: Effect) -> bool:
+    return any(variant is form for form in effect.variants)
+
+
+def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
+    """All numbers of a fitted model and what it leaves."""
+    forms = [
+        _form(d, model, effect, variant)
+        for variant in model.variants
+        for effect in d.experiment.effects
+        if _is_form(variant, effect)
+    ]
+    return {
+        "effects": forms,
+        "parameters": model.values,
+        "std": _std(d, model),
+        "error_fit": model.rms(d.baseline.used),
+        "error_holdout": holdout,
+    }
+
+
+def _parameters(d: Diagnosis) -> list[Parameter]:
+    """Of every model in the report, each once."""
+    models = [d.final] if d.best is None else [d.final, d.best]
+    found = {p.name: p for model in models for p in parameters_of(d.experiment, model.variants)}
+    return list(found.values())
+
+
+def _further_tests(d: Diagnosis) -> list[dict[str, Any]]:
+    """What would tell each effect from its rivals."""
+    found = []
+    for effect in d.effects:
+        for rival in d.rivals.get(effect.name, []):
+            found.append({"effects": [effect.name, rival], "do": further_test(effect.name, rival)})
+    return found
+
+
+def _left_out(d: Diagnosis, measurements: Sequence[Measurement]) -> dict[str, Any]:
+    """Readings that were not compared: spikes one by one, others by their number."""
+    readings = d.experiment.readings
+    outliers, unknown = [], []
+    runs = [(m, run) for m in measurements for run in m.runs]
+    for number, (m, run) in enumerate(runs):
+        place = {"folder": str(m.folder), "file": run.file}
+        own = np.flatnonzero(readings.run == number)
+        for i in np.flatnonzero(d.outliers[own]):
+            row = i if readings.row is None else readings.row[own[i]]
+            outliers.append(
+                place | {"reading": int(row) + 1, "observed": readings.observed[own[i]]}
+            )
+        count = int((~readings.usable[own]).sum())
+        if count:
+            unknown.append(place | {"readings": count, "of": len(own)})
+    return {"outliers": outliers, "not_comparable": unknown}
+
+
+def _finite(value: Any) -> Any:
+    """The same with plain Python numbers, None for those that JSON cannot say."""
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    return value

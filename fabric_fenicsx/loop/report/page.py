@@ -1,0 +1,168 @@
+"""report.html: what was found, with everything needed to believe or to doubt it, in one file."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+import os
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import pandas as pd
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from ... import __version__
+from ..inference.diagnosis import Diagnosis
+from .content import parameter_unit
+from .figures import candidates_figure, data_figure, law_figure, residual_figure, shown_model
+from .law_table import law_table
+
+__all__ = ["write_page"]
+
+DOTS = 160  # per inch, of the figures that are files
+
+
+def write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]]]) -> None:
+    """Write report.html, its figures as PNG files beside it and the fitted law as CSV.
+
+    Args:
+        folder: is there.
+        parts: each test's diagnosis and report, in the order of the tests.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    sections = []
+    for diagnosis, report in parts:
+        model = shown_model(diagnosis)
+        law = law_table(diagnosis, model[0] if model is not None else diagnosis.baseline)
+        figures = _figures(diagnosis, report, law)
+        for name, (figure, _) in figures.items():
+            # Laid out once for both formats.
+            figure.draw_without_rendering()
+            figure.set_layout_engine("none")
+            figure.savefig(folder / f"{report['test']}_{name}.png", dpi=DOTS)
+        if law is not None:
+            law.to_csv(folder / f"{report['test']}_law.csv", index=False)
+        sections.append(
+            {
+                "report": report,
+                "unit": parameter_unit(report["error"]["quantity"]),
+                "figures": {
+                    name: {"source": _inline(figure, name), "caption": caption}
+                    for name, (figure, caption) in figures.items()
+                },
+                "rows": _candidate_rows(report),
+                "parameters": _parameter_rows(report),
+            }
+        )
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    environment.filters |= {"number": number, "chance": chance}
+    template = files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
+    text = environment.from_string(template).render(sections=sections, version=__version__)
+    partial = folder / "report.html.partial"
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, folder / "report.html")
+
+
+def number(value: float | None, digits: int = 3) -> Markup:
+    """A number for a table; a dash where there is none."""
+    if value is None:
+        return Markup("&ndash;")
+    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
+        decimals = digits - 1 - (math.floor(math.log10(abs(value))) if value else 0)
+        return Markup(f"{value:.{max(decimals, 0)}f}".replace("-", "−"))
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    return Markup(f"{mantissa} × 10<sup>{int(power)}</sup>".replace("-", "−"))
+
+
+def chance(value: float | None) -> Markup:
+    """A probability for a table."""
+    if value is not None and value < 1e-12:
+        return Markup("&lt; 10<sup>−12</sup>")
+    return number(value, 2)
+
+
+def _figures(
+    diagnosis: Diagnosis, report: Mapping[str, Any], law: pd.DataFrame | None
+) -> dict[str, tuple[Figure, str]]:
+    """Figures by name, each with its caption."""
+    model = shown_model(diagnosis)
+    with_model = f" and the model {model[1]}" if model is not None else ""
+    made = {
+        "data": (
+            data_figure(diagnosis, _run_names(report)),
+            f"Readings, the fitted baseline{with_model}.",
+        ),
+        "residuals": (
+            residual_figure(diagnosis),
+            "What is left: reading minus model. A model that explains the data leaves points "
+            "without a pattern inside the band.",
+        ),
+    }
+    if law is not None:
+        drawn = law_figure(law, model[1] if model is not None else None)
+        made["law"] = (drawn, f"The fitted law{with_model}; the band is twice its standard error.")
+    candidates = candidates_figure(diagnosis)
+    if candidates is not None:
+        made["candidates"] = (candidates, "Errors with each effect added to the baseline alone.")
+    return made
+
+
+def _run_names(report: Mapping[str, Any]) -> list[str]:
+    several = len(report["measurements"]) > 1
+    return [
+        (f"{Path(m['folder']).name}: " if several else "") + (run["label"] or run["file"])
+        for m in report["measurements"]
+        for run in m["runs"]
+    ]
+
+
+def _inline(figure: Figure, name: str) -> str:
+    """A figure as a data URI: as an image of its own, its ids clash with no other's."""
+    buffer = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": name}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
+
+
+def _candidate_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Candidates, those with the smallest fitted error first, and what became of each."""
+    chosen = {effect["name"]: effect["rivals"] for effect in report["effects"]}
+    rows = []
+    for candidate in report["candidates"]:
+        of = [name for name, rivals in chosen.items() if candidate["name"] in rivals]
+        role = "chosen" if candidate["name"] in chosen else ""
+        if of:
+            role = "rival of " + " and ".join(of) if len(chosen) > 1 else "rival"
+        rows.append({**candidate, "role": role})
+    return sorted(rows, key=lambda row: math.inf if row["error_fit"] is None else row["error_fit"])
+
+
+def _parameter_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Parameters of the reported model, with their values in the baseline alone."""
+    groups = [("baseline", list(report["baseline"]["parameters"]))]
+    groups += [
+        (f"{effect['name']}: {effect['variant']}", list(effect["parameters"]))
+        for effect in report["effects"]
+    ]
+    rows = []
+    for group, names in groups:
+        for k, name in enumerate(names):
+            rows.append(
+                {
+                    "group": "" if k else group,
+                    "name": name,
+                    "value": report["model"]["parameters"][name],
+                    "std": report["model"]["std"][name],
+                    "alone": report["baseline"]["parameters"].get(name),
+                    **report["parameters"][name],
+                }
+            )
+    return rows

@@ -1,0 +1,264 @@
+"""What a run leaves on disk: every accepted step, a table of steps, a ParaView series, a result.
+
+A step file holds the accepted state in the order of the net's nodes, so that a run can go on from
+it on any number of ranks. Files are written beside their place and then moved there: a run that
+dies leaves whole files only.
+"""
+
+from __future__ import annotations
+
+import csv
+import errno
+import fcntl
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from ..fabric.net import Net
+from ..solving.balance import Balance
+from ..solving.model import Model
+from ..solving.predictor import DEPTH
+from ..solving.snapshot import Snapshot
+from ..solving.stepping import Step, Stepper
+from .files import replacing, write_npz, write_text
+from .paraview import TimeSeries
+from .results import read_net, write_setup
+from .surfaces import tool_surface
+
+__all__ = ["Record", "load_state", "prepare_folder", "write_result"]
+
+PLATE_EXTENT = 1.24
+"""How far out die and holder are drawn, over the farthest node of the flat sheet."""
+
+STEP_SCHEMA = "fabric-step/2"
+
+STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6 * DEPTH}
+"""What a step file has for each node, and how many numbers of it."""
+
+NUMBERS = ("time", "number", "previous_steps", "predictor_order", "next_step")
+"""What it has beside."""
+
+_CLAIMED: dict[Path, int] = {}
+"""Folders that this process has locked, and the handles that hold the locks."""
+
+
+def prepare_folder(folder: Path, comm: Any) -> None:
+    """Make the output folder and keep other runs out of it until this process ends; collective.
+
+    Raises:
+        InputError: it cannot be made or written, or another run writes there (on every rank).
+    """
+    problem = None
+    if comm.rank == 0:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            probe = folder / ".writable"
+            probe.write_text("")
+            probe.unlink()
+            problem = _claim(folder)
+        except OSError as error:
+            problem = f"{folder}: the output folder cannot be written ({error.strerror})"
+    problem = comm.bcast(problem)
+    if problem:
+        raise InputError(problem)
+
+
+def _claim(folder: Path) -> str | None:
+    """Lock the folder; what is wrong if another process has it.
+
+    The system drops the lock with the process, however that ends, so that none is ever stale.
+    """
+    if folder.resolve() in _CLAIMED:
+        return None
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        return f"{folder}: another run writes there, allowed is another folder"
+    except OSError as error:
+        # Some network file systems know no locks; there two runs are the user's own affair.
+        if error.errno not in (errno.EBADF, errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):
+            os.close(handle)
+            raise
+    _CLAIMED[folder.resolve()] = handle
+    return None
+
+
+class Record:
+    """Writes steps as they are accepted. Every method is collective; rank 0 writes.
+
+    Args:
+        folder: output folder; made by prepare_folder.
+        model: what is run.
+        resume_at: keep the steps up to this time [s]; None starts afresh.
+        case_text: what `case.yaml` shall say; None writes none.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        model: Model,
+        *,
+        resume_at: float | None = None,
+        case_text: str | None = None,
+    ) -> None:
+        self.folder, self.model = folder, model
+        self.rows: list[dict[str, float]] = []
+        self.steps = folder / "steps"
+        self._root = model.comm.rank == 0
+        if self._root:
+            self._open(resume_at)
+            (folder / "case.yaml").unlink(missing_ok=True)
+            if case_text is not None:
+                write_text(folder / "case.yaml", case_text)
+        past = model.comm.bcast(self.rows[-1] if self.rows else None)
+        self._balance = Balance(model, past)
+
+    def _open(self, resume_at: float | None) -> None:
+        """Start the series and the table, or cut both at the time to go on from."""
+        folder, net = self.folder, self.model.net
+        self.steps.mkdir(exist_ok=True)
+        extent = PLATE_EXTENT * float(np.abs(net.points[:, :2]).max())
+        table = folder / "steps.csv"
+        write_setup(folder, net, [tool_surface(t, extent, np.zeros(3)) for t in self.model.tools])
+        if resume_at is None:
+            for old in [*self.steps.glob("step_*.npz"), table, folder / "result.json"]:
+                old.unlink(missing_ok=True)
+            self._series = TimeSeries(folder / "paraview", net)
+            return
+        until = resume_at * (1.0 + 1e-12)
+        self._series = TimeSeries(folder / "paraview", net, resume=True, until=until)
+        if table.exists():
+            with table.open(newline="") as file:
+                rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+            self.rows = [row for row in rows if row["time_s"] <= until]
+
+    def observe(self, step: Step, measure: Callable[[Snapshot], dict[str, float]]) -> Snapshot:
+        """Write what is seen of a converged step: energies, tool forces, the ParaView files."""
+        model = self.model
+        snapshot = model.snapshot(step.time)
+        row: dict[str, float] = {
+            "step": step.number,
+            "time_s": step.time,
+            "step_s": step.length,
+            "iterations": step.iterations,
+            "failed_attempts": step.failures,
+        }
+        row |= self._balance.step(step.time)
+        row |= measure(snapshot)
+        self.rows.append(row)
+        if self._root:
+            self._series.add(
+                snapshot, {tool.name: model.tool_place(tool.name) for tool in model.tools}
+            )
+            with replacing(self.folder / "steps.csv") as path, path.open("w", newline="") as file:
+                writer = csv.DictWriter(file, list(row))
+                writer.writeheader()
+                writer.writerows(self.rows)
+        return snapshot
+
+    def keep(self, step: Step, stepper: Stepper) -> None:
+        """Write the accepted state."""
+        disc, state, predictor = self.model.disc, stepper.state, stepper.predictor
+        n = disc.owned
+        arrays = {
+            "u": disc.tows.u_n.x.array.reshape(-1, 3),
+            "q": disc.tows.q_n.x.array.reshape(-1, 4),
+            "v": state.v,
+            "vdot": state.vdot,
+            "a": state.a,
+            "previous": np.hstack(list(predictor.past)),
+        }
+        whole = {name: disc.gather_nodes(values[:n]) for name, values in arrays.items()}
+        histories = self.model.histories.save()
+        if self._root:
+            scalars = {
+                "schema": STEP_SCHEMA,
+                "time": step.time,
+                "number": step.number,
+                "previous_steps": predictor.lengths,
+                "predictor_order": predictor.order,
+                "next_step": state.next_step,
+            }
+            arrays = {name: np.asarray(value) for name, value in scalars.items()} | whole
+            arrays |= {f"history: {name}": values for name, values in histories.items()}
+            path = self.steps / f"step_{step.number:05d}.npz"
+            write_npz(path, arrays, compressed=False)
+
+
+def write_result(folder: Path, result: dict[str, Any]) -> None:
+    """Write result.json; one rank calls it."""
+    write_text(folder / "result.json", json.dumps(result, indent=2) + "\n")
+
+
+def load_state(path: Path, stepper: Stepper) -> None:
+    """Make a step file the accepted state; every rank reads it.
+
+    Raises:
+        InputError: it is not a step of this net.
+    """
+    disc, state = stepper.net, stepper.state
+    setup = path.parents[1] / "net.npz"
+    if setup.exists() and not _same(read_net(setup), disc.net):
+        raise InputError(f"{path}: a step of another net than that of this case")
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            data = {name: file[name] for name in file.files}
+        schema = str(data.get("schema", "fabric-step/1"))  # the first did not say
+        if schema != STEP_SCHEMA:
+            raise ValueError(f"schema {schema}, this version reads {STEP_SCHEMA}")
+        missing = {*STATE, *NUMBERS} - set(data)
+        if missing:
+            raise KeyError(f"{', '.join(sorted(missing))} missing")
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+        line = " ".join(str(error).split()).strip("'")
+        raise InputError(f"{path}: not a step file ({line})") from None
+    nodes = len(disc.net.points)
+    for name, width in STATE.items():
+        if data[name].shape != (nodes, width):
+            raise InputError(
+                f"{path}: {name} has shape {data[name].shape}; that of this net is {nodes, width}"
+            )
+
+    def local(name: str) -> npt.NDArray[np.float64]:
+        return data[name][disc.local_nodes]
+
+    disc.tows.u_n.x.array[:] = local("u").ravel()
+    disc.tows.q_n.x.array[:] = local("q").ravel()
+    if disc.connectors is not None:
+        disc.connectors.u_n.x.array[:] = data["u"][disc.connector_nodes].ravel()
+        disc.connectors.q_n.x.array[:] = data["q"][disc.connector_nodes].ravel()
+    state.v, state.vdot, state.a = local("v"), local("vdot"), local("a")
+    stepper.predictor.past = np.stack(np.hsplit(local("previous"), DEPTH))
+    stepper.predictor.lengths = data["previous_steps"]
+    stepper.predictor.order = int(data["predictor_order"])
+    state.time = float(data["time"])
+    state.next_step = float(data["next_step"])
+    stepper.number = int(data["number"])
+    prefix = "history: "
+    saved = {k.removeprefix(prefix): v for k, v in data.items() if k.startswith(prefix)}
+    try:
+        stepper.model.histories.load(saved)
+    except KeyError as error:
+        raise InputError(f"{path}: has no history {error}, which this case needs") from None
+    except (ValueError, IndexError):
+        raise InputError(f"{path}: a history has not the shape that this net needs") from None
+    stepper.model.stand(state.time)
+
+
+def _same(one: Net, other: Net) -> bool:
+    """Whether two nets are the same up to rounding."""
+    return (
+        one.points.shape == other.points.shape
+        and np.array_equal(one.cells, other.cells)
+        and np.array_equal(one.crossings, other.crossings)
+        and bool(np.allclose(one.points, other.points, rtol=0.0, atol=1e-9))
+    )

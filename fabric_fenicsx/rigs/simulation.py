@@ -1,0 +1,129 @@
+"""A run from its first to its last step: stepper, records and the account of where time went."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from .. import _dolfinx
+from ..errors import InputError, SolveError
+from ..output.record import Record, load_state
+from ..solving.model import Model
+from ..solving.snapshot import Snapshot
+from ..solving.stepping import Step, StepControl, Stepper
+
+__all__ = ["Run", "simulate"]
+
+RESULT_SCHEMA = "fabric-result/1"
+
+
+@dataclass(slots=True)
+class Run:
+    """What a run was, for result.json.
+
+    Attributes:
+        completed: whether it reached its end.
+        stop: why it stopped, if it did not.
+        rows: what was recorded at each accepted step.
+        last: the last accepted step, if there was one.
+        summary: the fixed part of result.json.
+    """
+
+    completed: bool
+    stop: str | None
+    rows: list[dict[str, float]]
+    last: Snapshot | None
+    summary: dict[str, Any]
+
+
+def simulate(
+    model: Model,
+    folder: Path,
+    *,
+    test: str,
+    end: float,
+    stops: Sequence[float] = (),
+    control: StepControl,
+    force_tolerance: float,
+    iteration_limit: int = 20,
+    measure: Callable[[Snapshot], dict[str, float]] = lambda snapshot: {},
+    progress: Callable[[float, int, int], None] = lambda time, step, iterations: None,
+    resume: bool = False,
+    case_text: str | None = None,
+    started: float | None = None,
+) -> Run:
+    """Run a model to its end, or as far as it goes. Collective.
+
+    Args:
+        model: what to run.
+        folder: where records go; it must exist.
+        test: name of the rig.
+        end: final time [s].
+        stops: times that steps must not jump over (where a prescribed motion has a corner) [s].
+        control: step lengths.
+        force_tolerance: residual norm at which a step is in balance [N, N mm].
+        iteration_limit: Newton iterations after which a step has failed.
+        measure: further columns for each step's row, from its snapshot.
+        progress: told the time reached, the step and its iterations.
+        resume: go on from the last step file in the folder.
+        case_text: the case as YAML, to be kept beside the records.
+        started: perf_counter() at the start of the command, for the total seconds.
+
+    Returns:
+        The run; ``completed`` is False where the step control gave up.
+
+    Raises:
+        InputError: there is nothing to resume.
+    """
+    started = perf_counter() if started is None else started
+    newton = model.newton(force_tolerance=force_tolerance, limit=iteration_limit)
+    stepper = Stepper(model, newton, control)
+    if resume:
+        files = sorted((folder / "steps").glob("step_*.npz"))
+        if not files:
+            raise InputError(f"{folder}: no step to resume from; run without resuming first")
+        load_state(files[-1], stepper)
+        if stepper.state.time >= end * (1.0 - 1e-12):
+            raise InputError(f"{folder}: the run is complete, there is nothing to resume")
+    resume_at = stepper.state.time if resume else None
+    record = Record(folder, model, resume_at=resume_at, case_text=case_text)
+
+    last: list[Snapshot] = []
+
+    def observe(step: Step) -> None:
+        last[:] = [record.observe(step, measure)]
+        progress(step.time, step.number, step.iterations)
+
+    stepper.observe = observe
+    stepper.keep = lambda step: record.keep(step, stepper)
+    stop = None
+    try:
+        for stop_at in (*sorted(stops), end):
+            stepper.run(stop_at)
+            # Beyond a corner of the motion the last steps are no guide.
+            stepper.predictor.forget()
+    except SolveError as error:
+        stop = str(error)
+    seconds = {
+        "total": perf_counter() - started,
+        "compile": _dolfinx.compile_seconds[0],
+        "assemble": model.system.assemble_seconds,
+        "solve": newton.solve_seconds,
+    }
+    summary = {
+        "schema": RESULT_SCHEMA,
+        "test": test,
+        "completed": stop is None,
+        "stopped_because": stop,
+        "steps": stepper.number,
+        "newton_iterations": newton.iterations,
+        "wasted_iterations": stepper.wasted_iterations,
+        "factorisations": newton.factorisations,
+        "ranks": model.comm.size,
+        "dofs": int(model.net.points.shape[0] * 6),
+        "seconds": {key: round(value, 3) for key, value in seconds.items()},
+    }
+    return Run(stop is None, stop, record.rows, last[0] if last else None, summary)

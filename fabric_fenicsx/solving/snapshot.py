@@ -1,0 +1,104 @@
+"""One accepted step in plain arrays: all that the writers and the pictures know of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..fabric.net import Net
+
+__all__ = ["Snapshot", "at_rest"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """State of a net at one time; nodes, cells and crossings in the order of the net.
+
+    Attributes:
+        time: time [s].
+        displacement: displacement of the nodes [mm], shape (n_nodes, 3).
+        directors: rows d1 (along the tow), d2 (across it, in the sheet) and d3 (the normal) at
+            each node, shape (n_nodes, 3, 3).
+        section_forces: axial force N1 and shear forces N2, N3 in the section's frame [N], shape
+            (n_cells, 3).
+        section_moments: torsion M1, out-of-plane bending M2 (about d2) and in-plane bending M3
+            (about d3) [N mm], shape (n_cells, 3).
+        contact_pressure: contact force per tow length [N/mm], shape (n_nodes,).
+        shear_angle: by how much each crossing has closed or opened [rad], shape (n_crossings,).
+        crossing_moment: moment between the tows of each crossing [N mm], shape (n_crossings,).
+
+    Raises:
+        ValueError: the arrays contradict each other.
+    """
+
+    time: float
+    displacement: npt.NDArray[np.float64]
+    directors: npt.NDArray[np.float64]
+    section_forces: npt.NDArray[np.float64]
+    section_moments: npt.NDArray[np.float64]
+    contact_pressure: npt.NDArray[np.float64]
+    shear_angle: npt.NDArray[np.float64]
+    crossing_moment: npt.NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.time):
+            raise ValueError(f"snapshot: time is {self.time}, not a finite number")
+        self._check_shapes(len(self.displacement), len(self.section_forces), len(self.shear_angle))
+
+    def check(self, net: Net) -> None:
+        """Make sure that the snapshot belongs to a net of this size.
+
+        Args:
+            net: the net that the arrays should follow.
+
+        Raises:
+            ValueError: an array has another shape than the net asks for.
+        """
+        self._check_shapes(len(net.points), len(net.cells), len(net.crossings))
+
+    def _check_shapes(self, nodes: int, cells: int, crossings: int) -> None:
+        shapes: list[tuple[str, tuple[int, ...]]] = [
+            ("displacement", (nodes, 3)),
+            ("directors", (nodes, 3, 3)),
+            ("section_forces", (cells, 3)),
+            ("section_moments", (cells, 3)),
+            ("contact_pressure", (nodes,)),
+            ("shear_angle", (crossings,)),
+            ("crossing_moment", (crossings,)),
+        ]
+        for name, shape in shapes:
+            given = np.shape(getattr(self, name))
+            if given != shape:
+                raise ValueError(f"snapshot: {name} has shape {given}, not {shape}")
+
+
+def at_rest(net: Net, time: float = 0.0) -> Snapshot:
+    """The net as it was made: no displacement, no forces, every crossing at its own angle.
+
+    Args:
+        net: the net.
+        time: time of the snapshot [s].
+
+    Returns:
+        The snapshot.
+    """
+    nodes, cells, crossings = len(net.points), len(net.cells), len(net.crossings)
+    d1, d3 = np.zeros((nodes, 3)), np.zeros((nodes, 3))
+    for end in (0, 1):  # the mean of the cells that meet at a node
+        np.add.at(d1, net.cells[:, end], net.tangents)
+        np.add.at(d3, net.cells[:, end], net.normals)
+    d1 /= np.linalg.norm(d1, axis=1)[:, None]
+    d3 -= np.einsum("ij,ij->i", d3, d1)[:, None] * d1
+    d3 /= np.linalg.norm(d3, axis=1)[:, None]
+    return Snapshot(
+        time=time,
+        displacement=np.zeros((nodes, 3)),
+        directors=np.stack([d1, np.cross(d3, d1), d3], axis=1),
+        section_forces=np.zeros((cells, 3)),
+        section_moments=np.zeros((cells, 3)),
+        contact_pressure=np.zeros(nodes),
+        shear_angle=np.zeros(crossings),
+        crossing_moment=np.zeros(crossings),
+    )
