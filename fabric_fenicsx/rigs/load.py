@@ -50,7 +50,7 @@ def load_case(path: Path, settings: Sequence[str] = ()) -> Case:
         origin = OPTION if ("test",) in changed else path
         raise InputError(one_line(f"{origin}: test: {shown}, allowed is {_tests()}"))
     model = CASES[test]
-    case, problems = mistakes(model, data)
+    case, problems = mistakes(model, data, path.parent)
     if not problems and (reason := _no_sheet(case)):
         problems = [((), reason)]
     if problems:

@@ -6,15 +6,19 @@ rather than one formula (friction, locking), it has several variants, and the da
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ...errors import InputError
 from ...inputs.keys import one_of
+from ...inputs.parameters import Parameter
+from ...inputs.python_file import classes_of, run_file
+from ...mechanics.laws.law import CrossingLaw, Form
 from ..measurement.reading import TESTS
 
 __all__ = [
@@ -24,46 +28,12 @@ __all__ = [
     "Parameter",
     "StripVariant",
     "Variant",
+    "law_effects",
     "read_effects",
     "scaled",
 ]
 
 Values = Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    """A number to be fitted.
-
-    Attributes:
-        name: with its unit at the end, as k1_N.
-        starts: values from which a fit is begun; an amplitude that the model is all but linear in
-            needs none.
-        lower, upper: bounds.
-        amplitude: whether it is the strength of an effect, zero in the baseline.
-        meaning: one line for the report.
-        share_of: "duration", "angle", "rate" or "travel": starts and bounds are shares of the
-            longest run, or of the largest shear angle, rate or displacement in the data; of a
-            cantilever "curvature" or "moment", the largest of them in the fitted baseline.
-        jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
-            for on both sides.
-        run: the run, counted from 0, that it alone belongs to.
-    """
-
-    name: str
-    starts: tuple[float, ...] = ()
-    lower: float = -float("inf")
-    upper: float = float("inf")
-    amplitude: bool = False
-    meaning: str = ""
-    share_of: str = ""
-    jumps: bool = False
-    run: int | None = None
-
-    @property
-    def one_sided(self) -> bool:
-        """An amplitude that cannot be negative."""
-        return self.amplitude and self.lower == 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +72,7 @@ class FrameVariant(Variant):
     """An effect in a picture frame, as expressions in UFL of its parameters.
 
     Attributes:
-        laws: shear laws (mechanics.shear_laws) whose moments per area of fabric [N] add.
+        laws: laws of a crossing (mechanics.laws) whose moments per area of fabric [N] add.
         travel: true crosshead displacement [mm] from an object with ``D`` [mm] and ``past`` (the
             true displacement at the reading before).
         reading: what the load cell adds [N] at the time t [s].
@@ -186,26 +156,48 @@ def scaled(effect: Effect, shares: Mapping[str, float]) -> Effect:
     return replace(effect, variants=variants)
 
 
+def law_effects(
+    laws: Iterable[type[CrossingLaw]], meanings: Mapping[str, str] = MappingProxyType({})
+) -> list[Effect]:
+    """The effects in a picture frame that laws of a crossing are forms of.
+
+    Args:
+        laws: those with forms are taken.
+        meanings: of effects in the order wanted, by their names; others come behind.
+    """
+    found: dict[str, list[tuple[type[CrossingLaw], Form]]] = {name: [] for name in meanings}
+    for law in laws:
+        for form in law.forms:
+            found.setdefault(form.effect, []).append((law, form))
+    effects = []
+    for name, forms in found.items():
+        meaning = meanings.get(name) or next((form.meaning for _, form in forms), "")
+        variants = [
+            FrameVariant(form.label, form.parameters, laws=partial(form.laws, law))
+            for law, form in sorted(forms, key=lambda pair: pair[1].rank)
+        ]
+        effects.append(Effect(name, "picture_frame", meaning, tuple(variants)))
+    return effects
+
+
 def read_effects(path: Path) -> list[Effect]:
-    """A user's own effects, from the list ``EFFECTS`` of a Python file. It is run.
+    """A user's own effects: laws of a crossing with forms, and what a list ``EFFECTS`` adds.
+
+    Args:
+        path: a Python file. It is run.
 
     Raises:
-        InputError: the file cannot be run or has no such list.
+        InputError: the file cannot be run or has no effects.
     """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, allowed is a Python file with a list EFFECTS")
-    spec = importlib.util.spec_from_file_location(f"effects_of_{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise InputError(f"{path}: no Python file, allowed is a name that ends in .py")
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(f"{path}: {reason}") from error
-    effects = getattr(module, "EFFECTS", None)
+    module = run_file(path, "effects")
+    effects = getattr(module, "EFFECTS", ())
     if not isinstance(effects, (list, tuple)) or not all(isinstance(e, Effect) for e in effects):
-        raise InputError(f"{path}: EFFECTS: missing, allowed is a list of loop.effects.Effect")
+        raise InputError(f"{path}: EFFECTS, allowed is a list of loop.inference.effects.Effect")
+    effects = [*law_effects(classes_of(module, CrossingLaw)), *effects]
+    if not effects:
+        raise InputError(
+            f"{path}: no effects, allowed is a CrossingLaw with forms, or a list EFFECTS"
+        )
     for effect in effects:
         if effect.test not in TESTS:
             raise InputError(
@@ -217,4 +209,4 @@ def read_effects(path: Path) -> list[Effect]:
                     f"{path}: {effect.name}: {p.name}: no starts, allowed is one or more of them "
                     "unless it is an amplitude"
                 )
-    return list(effects)
+    return effects

@@ -5,8 +5,8 @@ the whole net is that of one crossing times their number. With m per area of fab
 
     D = L (2 cos θ − √2),    θ = π/4 − γ/2,    F = m(γ, γ̇, ...) L_fabric² / (L sin θ)
 
-from the virtual work F dD = m L_fabric² dγ. The laws are those of mechanics.shear_laws, the same
-objects that the whole net takes; how far tows that bend between crossings leave this is tested.
+from the virtual work F dD = m L_fabric² dγ. The laws are those of mechanics.laws, the same
+classes that the whole net takes; how far tows that bend between crossings leave this is tested.
 """
 
 from __future__ import annotations
@@ -21,10 +21,13 @@ import numpy as np
 import numpy.typing as npt
 from ufl import acos, sin
 
+from ....inputs.parameters import Parameter
+from ....mechanics.laws.dashpots import LinearDashpot
+from ....mechanics.laws.law import Crossing
+from ....mechanics.laws.springs import PolynomialSpring
 from ....mechanics.scalars import derivative_of
-from ....mechanics.shear_laws import Crossing, LinearDashpot, PolynomialSpring
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, FrameVariant, Parameter, Variant, scaled
+from ...inference.effects import Effect, FrameVariant, Variant, scaled
 from ...inference.experiment import Readings
 from ...inference.noise import estimated_noise
 from ...measurement.reading import Measurement
@@ -223,7 +226,7 @@ class PictureFrame:
             at, p = marched.at, marched.at
             if variant is None:
                 laws: tuple[Any, ...] = (
-                    PolynomialSpring({1: p["k1_N"], 3: p["k3_N"]}),
+                    PolynomialSpring(k1=p["k1_N"], k3=p["k3_N"]),
                     LinearDashpot(p["c1_N_s"]),
                 )
             else:
