@@ -163,7 +163,9 @@ def test_dahl_friction():
     limit, sigma = 1.0, 10.0
     up = limit * (1.0 - np.exp(-sigma * np.array([0.05, 0.2])))
     back = -limit + (up[1] + limit) * np.exp(-sigma * 0.1)
-    assert moments(DahlFriction(limit, limit / sigma), [0.05, 0.2, 0.1]) == pytest.approx([*up, back])
+    assert moments(DahlFriction(limit, limit / sigma), [0.05, 0.2, 0.1]) == pytest.approx(
+        [*up, back]
+    )
 
 
 def test_friction_is_rate_independent():

@@ -140,7 +140,11 @@ def test_a_hidden_turn_of_a_clamp_is_found(tmp_path):
     [
         ('"stitch_tightening"', '"load_drift"', "load_drift: stands twice"),
         ("(0.03, 0.1, 0.2)", "()", "tight_angle_rad: no starts"),
-        ("(self.limit) * tanh", "(self.limit) * tan", "stitch_tightening, tanh: cannot be evaluated"),
+        (
+            "(self.limit) * tanh",
+            "(self.limit) * tan",
+            "stitch_tightening, tanh: cannot be evaluated",
+        ),
         ("    forms = (", "    fforms = (", "no effects, allowed is a CrossingLaw with forms"),
         ("ln, tanh", "ln, tan_h", "ImportError"),
     ],
