@@ -201,6 +201,7 @@ def test_two_of_a_kind_are_two(law):
     np.testing.assert_allclose(seen.moment, apart, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.mpi
 def test_two_branches_in_a_hold():
     """Two branches of 1 s and 20 s: Σ k r τ (1 − e^(−t/τ)) e^(−hold/τ)."""
     taus, k, rate, time = np.array([1.0, 20.0]), 10.0, 0.05, 4.0
@@ -212,6 +213,7 @@ def test_two_branches_in_a_hold():
     assert seen.moment[-1] == pytest.approx((peak * np.exp(-3.0 / taus)).sum(), rel=1e-3)
 
 
+@pytest.mark.mpi
 def test_energies_of_two_of_a_kind_stand_apart():
     seen = twice("coulomb_friction")
     names = [f"energy_Coulomb_friction{end}_N_mm" for end in ("", "_2")]
@@ -220,6 +222,7 @@ def test_energies_of_two_of_a_kind_stand_apart():
     assert [seen.rows[1][name] for name in names] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.mpi
 def test_a_name_stands_once():
     class Same(LAWS["linear_dashpot"]):
         name = "Coulomb friction 2"
