@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 from scipy.integrate import solve_bvp, trapezoid
 
-from fabric_fenicsx.output.record import prepare_folder
+from fabric_fenicsx.output.folder import prepare_folder
 from fabric_fenicsx.rigs import cantilever
 from fabric_fenicsx.rigs.cases import CantileverCase
 from fabric_fenicsx.rigs.common import Session, section

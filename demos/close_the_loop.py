@@ -22,12 +22,8 @@
 from pathlib import Path
 from typing import Any
 
-from fabric_fenicsx.loop.inference.search import diagnose_test
-from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
-from fabric_fenicsx.loop.measurement.reading import read_measurement
-from fabric_fenicsx.loop.report.content import test_report, write_report
+from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.report.figures import data_figure, residual_figure
-from fabric_fenicsx.loop.report.page import write_page
 from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
 from fabric_fenicsx.rigs.load import load_case
 
@@ -51,15 +47,12 @@ def main(folder: Path = Path("results/demo_close_the_loop")) -> dict[str, Any]:
     if not measured.exists():
         case = load_case(CASE, SETTINGS)
         write_measurement(measured, synthesise(case, [HIDDEN], NOISE, rates=RATES))
-    measurement = read_measurement(measured)
-    diagnosis = diagnose_test(PictureFrame([measurement]))
-    report = test_report(diagnosis, [measurement])
-    write_page(folder, [(diagnosis, report)])
-    write_report(folder, report)
+    found = diagnose([read_measurement(measured)], folder)
+    (diagnosis,) = found.diagnoses
     names = [f"{rate:g} mm/min" for rate in RATES]
     data_figure(diagnosis, names).savefig(folder / "close_the_loop.png", dpi=150)
     residual_figure(diagnosis).savefig(folder / "close_the_loop_residuals.png", dpi=150)
-    return report
+    return found.report
 
 
 if __name__ == "__main__":

@@ -24,8 +24,8 @@ from fabric_fenicsx.fabric.gmsh_io import read_msh, write_msh
 from fabric_fenicsx.fabric.section import RectangularSection
 from fabric_fenicsx.fabric.sheet import centred_sheet
 from fabric_fenicsx.mechanics.tools import Mould
+from fabric_fenicsx.output.folder import prepare_folder
 from fabric_fenicsx.output.pictures import draw_net
-from fabric_fenicsx.output.record import prepare_folder
 from fabric_fenicsx.output.surfaces import TriangleSurface
 from fabric_fenicsx.rigs.simulation import simulate
 from fabric_fenicsx.solving.model import Model, Support

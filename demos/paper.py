@@ -25,7 +25,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from scipy.interpolate import LinearNDInterpolator
 
-from fabric_fenicsx.output.record import prepare_folder
+from fabric_fenicsx.output.folder import prepare_folder
 from fabric_fenicsx.rigs import cantilever, drape, picture_frame
 from fabric_fenicsx.rigs.cases import CantileverCase, DrapeCase, PictureFrameCase
 from fabric_fenicsx.rigs.common import Session

@@ -19,7 +19,7 @@ from mpi4py import MPI
 import numpy as np
 import pandas as pd
 
-from fabric_fenicsx.output.record import prepare_folder
+from fabric_fenicsx.output.folder import prepare_folder
 from fabric_fenicsx.rigs import picture_frame
 from fabric_fenicsx.rigs.cases import PictureFrameCase
 from fabric_fenicsx.rigs.common import Session

@@ -18,14 +18,15 @@ from typing import Any
 import numpy as np
 import yaml
 
+from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
 from fabric_fenicsx.loop.kinds.drape.model import Drape
 from fabric_fenicsx.loop.kinds.drape.shear_field import Solve, solved_field
-from fabric_fenicsx.loop.measurement.reading import FILE, SCHEMA, read_measurement
-from fabric_fenicsx.loop.report.content import test_report, write_report
-from fabric_fenicsx.loop.report.page import write_page
+from fabric_fenicsx.loop.measurement.schema import FILE, SCHEMA
+from fabric_fenicsx.loop.report.content import test_report
+from fabric_fenicsx.loop.report.page import write_report
 from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
 
@@ -204,8 +205,7 @@ def main(folder: Path = Path("results/table_4"), solve: Solve = solved_field) ->
     drape = Drape([measurement], solve=solve)
     d = diagnose_test(drape)
     report = test_report(d, [measurement])
-    write_page(folder, [(d, report)])
-    write_report(folder, report)
+    write_report(folder, [(d, report)], report)
     return {"page": page(drape, d, report), "report": report}
 
 

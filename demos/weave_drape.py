@@ -19,8 +19,8 @@ from mpi4py import MPI
 import numpy as np
 
 from fabric_fenicsx.fabric.weave import WEAVES
+from fabric_fenicsx.output.folder import prepare_folder
 from fabric_fenicsx.output.pictures import draw_net
-from fabric_fenicsx.output.record import prepare_folder
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session, control

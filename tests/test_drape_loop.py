@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from test_demos import demo
 
 from fabric_fenicsx.errors import InputError, SolveError
+from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
@@ -23,7 +24,6 @@ from fabric_fenicsx.loop.kinds.drape.shear_field import (
     hermite_weights,
     solved_field,
 )
-from fabric_fenicsx.loop.measurement.reading import read_measurement
 from fabric_fenicsx.loop.report.content import test_report as report_of
 from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
 from fabric_fenicsx.rigs.cases import DrapeCase

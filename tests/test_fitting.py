@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from measurements.sets import sixty
 
+from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.effects import Parameter
 from fabric_fenicsx.loop.inference.experiment import Readings
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
-from fabric_fenicsx.loop.measurement.reading import read_measurement
 
 
 class Line:

@@ -62,7 +62,8 @@ def _run(
 
     case = from_root(comm, lambda: load_case(path, settings))
 
-    from ..output.record import prepare_folder, write_result
+    from ..output.folder import prepare_folder
+    from ..output.record import write_result
     from ..rigs.common import Session
     from ..rigs.registry import RUNNERS
     from ..rigs.write_case import case_text

@@ -8,10 +8,7 @@ dies leaves whole files only.
 from __future__ import annotations
 
 import csv
-import errno
-import fcntl
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -32,7 +29,7 @@ from .paraview import TimeSeries
 from .results import read_net, write_setup
 from .surfaces import tool_surface
 
-__all__ = ["Record", "load_state", "prepare_folder", "write_result"]
+__all__ = ["Record", "load_state", "write_result"]
 
 PLATE_EXTENT = 1.24
 """How far out die and holder are drawn, over the farthest node of the flat sheet."""
@@ -44,52 +41,6 @@ STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6 * DEPTH}
 
 NUMBERS = ("time", "number", "previous_steps", "predictor_order", "next_step")
 """What it has beside."""
-
-_CLAIMED: dict[Path, int] = {}
-"""Folders that this process has locked, and the handles that hold the locks."""
-
-
-def prepare_folder(folder: Path, comm: Any) -> None:
-    """Make the output folder and keep other runs out of it until this process ends; collective.
-
-    Raises:
-        InputError: it cannot be made or written, or another run writes there (on every rank).
-    """
-    problem = None
-    if comm.rank == 0:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            probe = folder / ".writable"
-            probe.write_text("")
-            probe.unlink()
-            problem = _claim(folder)
-        except OSError as error:
-            problem = f"{folder}: the output folder cannot be written ({error.strerror})"
-    problem = comm.bcast(problem)
-    if problem:
-        raise InputError(problem)
-
-
-def _claim(folder: Path) -> str | None:
-    """Lock the folder; what is wrong if another process has it.
-
-    The system drops the lock with the process, however that ends, so that none is ever stale.
-    """
-    if folder.resolve() in _CLAIMED:
-        return None
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(handle)
-        return f"{folder}: another run writes there, allowed is another folder"
-    except OSError as error:
-        # Some network file systems know no locks; there two runs are the user's own affair.
-        if error.errno not in (errno.EBADF, errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):
-            os.close(handle)
-            raise
-    _CLAIMED[folder.resolve()] = handle
-    return None
 
 
 class Record:

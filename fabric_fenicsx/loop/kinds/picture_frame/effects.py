@@ -22,7 +22,8 @@ from ....mechanics.shear_laws import (
     PowerDashpot,
     SmoothLocking,
 )
-from ...inference.effects import Effect, FrameVariant, Parameter, Values
+from ...inference.effects import Effect, Parameter, Values
+from .variant import FrameVariant
 
 __all__ = ["PICTURE_FRAME_EFFECTS"]
 

@@ -24,12 +24,13 @@ from ufl import acos, sin
 from ....mechanics.scalars import derivative_of
 from ....mechanics.shear_laws import Crossing, LinearDashpot, PolynomialSpring
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, FrameVariant, Parameter, Variant, scaled
+from ...inference.effects import Effect, Parameter, Variant, scaled
 from ...inference.experiment import Readings
 from ...inference.noise import estimated_noise
-from ...measurement.reading import Measurement
+from ...measurement.schema import Measurement
 from .effects import PICTURE_FRAME_EFFECTS
-from .motion import Programme, frame_programme
+from .motion import Motion, frame_motion
+from .variant import FrameVariant
 
 __all__ = ["PictureFrame"]
 
@@ -58,13 +59,13 @@ class PictureFrame:
     def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
         self.noise = _common_noise(measurements)
         runs = [(m, run) for m in measurements for run in m.runs]
-        programmes = [
-            frame_programme(
+        motions = [
+            frame_motion(
                 run.columns["time_s"], run.columns["displacement_mm"], m.rig.frame_length_mm
             )
             for m, run in runs
         ]
-        self._lay_out(programmes)
+        self._lay_out(motions)
         self._rig = {
             "frame": Varying(np.array([[m.rig.frame_length_mm for m, _ in runs]])),
             "fabric": Varying(np.array([[m.rig.fabric_length_mm for m, _ in runs]])),
@@ -77,7 +78,7 @@ class PictureFrame:
             observed=np.concatenate([run.columns["force_N"] for _, run in runs]),
             run=np.repeat(np.arange(len(runs)), [run.count for _, run in runs]),
             holdout=np.repeat([run.holdout for _, run in runs], [run.count for _, run in runs]),
-            usable=np.concatenate([p.certain for p in programmes]),
+            usable=np.concatenate([p.certain for p in motions]),
             weight=np.ones(sum(run.count for _, run in runs)),
             names=tuple(run.label or run.file for _, run in runs),
             covariates={
@@ -86,17 +87,19 @@ class PictureFrame:
                 "time [s]": time,
             },
         )
-        doubt = np.concatenate([p.doubt for p in programmes])
-        self._leave_out_uncertain(doubt * self._at_readings(kinematics["rate_per_speed"].value))
+        rate_error = np.concatenate([p.rate_error for p in motions])
+        self._leave_out_uncertain(
+            rate_error * self._at_readings(kinematics["rate_per_speed"].value)
+        )
         shares = {
-            "duration": max(float(p.time[-1] - p.time[0]) for p in programmes),
+            "duration": max(float(p.time[-1] - p.time[0]) for p in motions),
             "angle": float(np.abs(gamma).max()),
             "rate": float(np.abs(rate).max()),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
         self.effects = [self._with_runs(scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
 
-    def _leave_out_uncertain(self, doubt: Array) -> None:
+    def _leave_out_uncertain(self, rate_error: Array) -> None:
         """Leave out readings whose rate is so uncertain [rad/s] that the dashpot's force is.
 
         By more than a reading scatters, with the dashpot of a first fit, which also says how much
@@ -111,19 +114,19 @@ class PictureFrame:
         residual = self.readings.observed - J @ k
         noise = self.noise or estimated_noise(residual, self.readings, rows)
         factor = self._at_readings(self._kinematics(self._travel(None, {}), {})["factor"].value)
-        # Where nothing is known of the rate the programme has left the reading out itself.
-        doubt = np.where(np.isfinite(doubt), doubt, 0.0)
-        clear = ~(np.abs(k[-1] * factor * doubt) >= noise)
+        # Where nothing is known of the rate the motion has left the reading out itself.
+        rate_error = np.where(np.isfinite(rate_error), rate_error, 0.0)
+        clear = ~(np.abs(k[-1] * factor * rate_error) >= noise)
         if (rows & clear).sum() > rows.sum() / 2:
             self.readings = replace(self.readings, usable=self.readings.usable & clear)
 
-    def _lay_out(self, programmes: Sequence[Programme]) -> None:
+    def _lay_out(self, motions: Sequence[Motion]) -> None:
         """Records side by side; the shorter ones rest at their last point."""
-        longest = max(len(p.time) for p in programmes)
-        shape = (longest, len(programmes))
+        longest = max(len(p.time) for p in motions)
+        shape = (longest, len(motions))
         time, D, rate = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         places = []
-        for r, p in enumerate(programmes):
+        for r, p in enumerate(motions):
             count = len(p.time)
             time[:count, r], D[:count, r], rate[:count, r] = p.time, p.displacement, p.rate
             time[count:, r] = p.time[-1] + np.arange(1, longest - count + 1)
