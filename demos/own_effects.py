@@ -15,7 +15,8 @@ from typing import Any
 
 from ufl import tanh
 
-from fabric_fenicsx.loop.inference.effects import Effect, FrameVariant, Parameter
+from fabric_fenicsx.loop.inference.effects import Effect, Parameter
+from fabric_fenicsx.loop.kinds.picture_frame.variant import FrameVariant
 from fabric_fenicsx.mechanics.shear_laws import Crossing
 
 # %% [markdown]

@@ -48,15 +48,15 @@ def fitted(seed):
     return line, fit(line, (), {"a": 0.0, "b": 0.0}, line.readings.fit)
 
 
-def test_what_is_foreseen_is_the_textbook_s():
+def test_the_predictive_check_is_the_textbook_s():
     line, model = fitted(1)
     out = line.readings.holdout
     J = np.column_stack([np.ones_like(line.t), line.t])
     C = np.linalg.inv(J[~out].T @ J[~out])
     r = model.residual[out]
     exact = r @ np.linalg.solve(np.eye(out.sum()) + J[out] @ C @ J[out].T, r)
-    assert model.foreseen(out) == pytest.approx(np.sqrt(exact / out.sum()), rel=1e-9)
-    assert np.isnan(model.foreseen(np.zeros_like(out)))
+    assert model.predictive_rms(out) == pytest.approx(np.sqrt(exact / out.sum()), rel=1e-9)
+    assert np.isnan(model.predictive_rms(np.zeros_like(out)))
     doubt = model.error_of({"a": np.ones(2), "b": np.array([0.0, 3.5])}, noise=0.0)
     scatter = np.sqrt(model.sum_of_squares / 38)
     expected = [np.sqrt(C[0, 0]), np.sqrt(np.array([1, 3.5]) @ C @ np.array([1, 3.5]))]
@@ -68,7 +68,7 @@ def test_an_extrapolated_line_is_no_surprise():
     for seed in range(300):
         line, model = fitted(seed)
         raw.append(model.rms(line.readings.holdout) ** 2)
-        foreseen.append(model.foreseen(line.readings.holdout) ** 2)
+        foreseen.append(model.predictive_rms(line.readings.holdout) ** 2)
     # χ² of 30 over 30: its mean over 300 lines is known to 0.015.
     assert np.mean(foreseen) == pytest.approx(1.0, abs=0.06)
     assert np.mean(raw) > 2.5
@@ -90,7 +90,7 @@ def test_what_the_data_do_not_tell_is_not_certain():
     # However large the doubt, what no parameter can change must still be foreseen.
     out = line.readings.holdout
     lost = replace(model, root=1e20 * model.root)
-    assert lost.foreseen(out) == pytest.approx(np.std(model.residual[out]), rel=1e-6)
+    assert lost.predictive_rms(out) == pytest.approx(np.std(model.residual[out]), rel=1e-6)
 
 
 def diagnosed(seed, name):
