@@ -304,6 +304,8 @@ def test_the_law_of_other_tests_is_taken(tmp_path):
     assert cases[0].tow.C1_MPa == 2000.0
     assert "fitted to the other tests" in drape.notes[0]
     assert "fitted to the other tests" in drape.notes[1]
+    assert any("k1_N = -0.01" in note and "negative" in note for note in drape.notes)
+    assert not any("k3_N" in note for note in drape.notes)
 
 
 def test_the_case_weighs_what_the_fabric_does(tmp_path):

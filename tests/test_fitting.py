@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from measurements.sets import sixty
 
+from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.effects import Parameter
 from fabric_fenicsx.loop.inference.experiment import Readings
 from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 
@@ -91,6 +93,49 @@ def test_what_the_data_do_not_tell_is_not_certain():
     out = line.readings.holdout
     lost = replace(model, root=1e20 * model.root)
     assert lost.predictive_rms(out) == pytest.approx(np.std(model.residual[out]), rel=1e-6)
+
+
+class Exponential(Line):
+    """exp(-a t), which a fit does not reach in two evaluations; without noise."""
+
+    baseline = (Parameter("a", (0.1,)),)
+
+    def __init__(self):
+        super().__init__(np.random.default_rng(0))
+        self.readings = replace(self.readings, observed=np.exp(-5.0 * self.t))
+
+    def predict(self, variants, values):
+        y = np.exp(-values["a"] * self.t)
+        return y, {"a": -self.t * y}
+
+
+def test_a_fit_that_ends_at_its_cap_has_not_converged():
+    line = Exponential()
+    stopped, done = (
+        fit(line, (), {"a": 0.1}, line.readings.fit, evaluations=count) for count in (2, 60)
+    )
+    assert not stopped.converged and stopped.values["a"] < 4.0
+    assert done.converged and done.values["a"] == pytest.approx(5.0, rel=1e-6)
+
+
+def test_parts_that_cannot_be_predicted_are_counted():
+    class Failing(Line):
+        def predict(self, variants, values):
+            if values["a"] == 0.0 and values["b"] == 0.0 and self.starting:
+                raise SolveError("no solution at the start")
+            return super().predict(variants, values)
+
+    line = Failing(np.random.default_rng(2))
+    line.starting = False
+    line.readings = replace(line.readings, holdout=np.zeros(70, dtype=bool))
+    judge = Judge(line)
+    model = fit(line, (), {"a": 0.0, "b": 0.0}, judge.rows)
+    whole = judge.cross_validated(model)
+    assert (whole.parts, whole.failed) == (2, 0) and 1.0 < whole.error < 10.0
+    # The same model with values that have no solution to begin with: no part is predicted.
+    line.starting = True
+    none = judge.cross_validated(replace(model, values={"a": 0.0, "b": 0.0}))
+    assert (none.parts, none.failed) == (2, 2) and np.isnan(none.error)
 
 
 def diagnosed(seed, name):

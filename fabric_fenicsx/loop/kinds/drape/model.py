@@ -242,14 +242,14 @@ class Drape:
         return [
             f"Shear law m = {law.k1:.4g} γ + {law.k3:.4g} γ³ + {law.c1:.4g} dγ/dt N/mm "
             f"({self._shear_source}).",
-            *(
-                f"{part} was fitted to the picture frame: negative, so that 0 is taken here."
-                for part in self._clipped
-            ),
             f"C1 = {C1} MPa ({self._C1_source}).",
             f"The model's own scatter, from two meshes, is {scatter:.2g} degrees rms at these "
             "places. Readings are weighted with it and errors are weighted errors: one as large "
             "as the noise means a misfit of noise and model scatter together.",
+            *(
+                f"{part} was fitted to the picture frame: negative, so that 0 is taken here."
+                for part in self._clipped
+            ),
             *(f"{n} = {a:g}: {why}; left out." for (n, a), why in self._unsolved.items()),
         ]
 
