@@ -18,8 +18,10 @@ import yaml
 from ..errors import InputError
 from ..inputs.keys import one_of
 from ..inputs.validation import suggestion
-from ..rigs.cases import CantileverCase, Case, DrapeCase, PictureFrameCase, TowKeys
-from ..rigs.picture_frame import crosshead, duration
+from ..rigs.cantilever import CantileverCase
+from ..rigs.cases import TowKeys
+from ..rigs.drape import DrapeCase
+from ..rigs.picture_frame import PictureFrameCase, crosshead, duration
 from .inference.effects import Effect, Variant
 from .inference.experiment import Experiment
 from .inference.fitting import orthogonal_to, weighted
@@ -44,6 +46,7 @@ from .registry import experiment_class
 __all__ = ["Hidden", "Synthetic", "parse_effect", "synthesise", "write_measurement"]
 
 Array = npt.NDArray[np.float64]
+Case = PictureFrameCase | CantileverCase | DrapeCase
 
 #: Root mean square that an effect leaves of the baseline's best imitation, over noise, where its
 #: strength is not given.
