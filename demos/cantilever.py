@@ -25,9 +25,8 @@ from scipy.integrate import solve_bvp, trapezoid
 
 from fabric_fenicsx.output.folder import prepare_folder
 from fabric_fenicsx.rigs import cantilever
-from fabric_fenicsx.rigs.cases import CantileverCase
+from fabric_fenicsx.rigs.cantilever import CantileverCase, strip
 from fabric_fenicsx.rigs.common import Session, section
-from fabric_fenicsx.rigs.fabrics import strip
 
 
 # %%

@@ -19,8 +19,8 @@ import numpy as np
 
 from fabric_fenicsx.output.folder import prepare_folder
 from fabric_fenicsx.rigs import drape
-from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session
+from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
 
 CASE = Path(__file__).parent / "drape.yaml"

@@ -27,9 +27,11 @@ from scipy.interpolate import LinearNDInterpolator
 
 from fabric_fenicsx.output.folder import prepare_folder
 from fabric_fenicsx.rigs import cantilever, drape, picture_frame
-from fabric_fenicsx.rigs.cases import CantileverCase, DrapeCase, PictureFrameCase
+from fabric_fenicsx.rigs.cantilever import CantileverCase
 from fabric_fenicsx.rigs.common import Session
+from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
+from fabric_fenicsx.rigs.picture_frame import PictureFrameCase
 
 HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"

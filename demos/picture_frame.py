@@ -21,8 +21,8 @@ import pandas as pd
 
 from fabric_fenicsx.output.folder import prepare_folder
 from fabric_fenicsx.rigs import picture_frame
-from fabric_fenicsx.rigs.cases import PictureFrameCase
 from fabric_fenicsx.rigs.common import Session
+from fabric_fenicsx.rigs.picture_frame import PictureFrameCase
 
 K1, K3, BETA = 0.02, 0.08, 2.0  # N/mm, N/mm, N s/mm
 

@@ -27,7 +27,7 @@ from fabric_fenicsx.loop.kinds.drape.shear_field import Solve, solved_field
 from fabric_fenicsx.loop.measurement.schema import FILE, SCHEMA
 from fabric_fenicsx.loop.report.content import test_report
 from fabric_fenicsx.loop.report.page import write_report
-from fabric_fenicsx.rigs.cases import DrapeCase
+from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
 
 HERE = Path(__file__).parent

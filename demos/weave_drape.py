@@ -22,8 +22,8 @@ from fabric_fenicsx.fabric.weave import WEAVES
 from fabric_fenicsx.output.folder import prepare_folder
 from fabric_fenicsx.output.pictures import draw_net
 from fabric_fenicsx.rigs import drape
-from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session, control
+from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.simulation import simulate
 from fabric_fenicsx.rigs.weave_keys import WeaveKeys
 

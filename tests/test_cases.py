@@ -1,14 +1,19 @@
 """Case files: what is read, and the one line that each mistake gets."""
 
+import subprocess
+import sys
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.inputs.keys import documented, plain
-from fabric_fenicsx.rigs.cases import CASES, CantileverCase, DrapeCase
+from fabric_fenicsx.rigs.cantilever import CantileverCase
+from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
+from fabric_fenicsx.rigs.registry import RIGS, rig
 
 DEMOS = Path(__file__).parents[1] / "demos"
 
@@ -178,18 +183,18 @@ def test_a_bad_setting_names_the_option(tmp_path, setting, expected):
 
 
 def test_every_key_is_documented():
-    for model in CASES.values():
-        rows = {row.name: row for row in documented(model)}
+    for name in RIGS:
+        rows = {row.name: row for row in documented(rig(name).case)}
         assert len(rows) > 20
         for row in rows.values():
             assert row.description and row.allowed and row.default
-    rows = {row.name: row for row in documented(CASES["drape"])}
+    rows = {row.name: row for row in documented(rig("drape").case)}
     assert rows["crossover.alignment_N_mm"].unit == "N mm"
     assert rows["crossover.k1_N_mm"].unit == "N/mm"
     assert rows["tow.density_kg_mm3"].unit == "kg/mm³"
     assert rows["points[].x_mm"].default == "needed"
     assert rows["sheet.subdivisions"].allowed == "a whole number from 1 to 64"
-    assert CASES["cantilever"] is CantileverCase
+    assert rig("cantilever").case is CantileverCase
 
 
 def test_long_values_are_shortened():
@@ -240,3 +245,26 @@ def test_shear_laws_become_laws_of_a_crossing(tmp_path):
     friction = law.build(144.0)
     assert friction.limit == pytest.approx(1.44)
     assert friction.stiffness == pytest.approx(1.44 / np.radians(1.0))
+
+
+def test_a_rig_is_called_like_its_file_and_an_unknown_one_is_told_the_names():
+    for name in RIGS:
+        assert get_args(rig(name).case.model_fields["test"].annotation) == (name,)
+    with pytest.raises(InputError, match="test: nothing, allowed is drape, picture_frame or can"):
+        rig("nothing")
+
+
+def test_a_case_is_read_and_laid_out_without_dolfinx():
+    """Reading must not wait for what only a run needs."""
+    code = """
+import sys
+from pathlib import Path
+from fabric_fenicsx.rigs.load import load_case
+from fabric_fenicsx.rigs.registry import RIGS, rig
+for name in RIGS:
+    case = load_case(Path(sys.argv[1]) / f"{name}.yaml")
+    assert rig(name).fabrics(case, Path())
+heavy = {"dolfinx", "petsc4py", "mpi4py", "pyvista", "gmsh", "matplotlib"} & set(sys.modules)
+assert not heavy, heavy
+"""
+    subprocess.run([sys.executable, "-c", code, str(DEMOS)], check=True, timeout=60)

@@ -13,7 +13,7 @@ from fabric_fenicsx import __version__
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.cli.app import EXAMPLES
 from fabric_fenicsx.inputs.keys import documented
-from fabric_fenicsx.rigs.cases import CASES
+from fabric_fenicsx.rigs.registry import RIGS, rig
 
 TINY = """\
 test: drape
@@ -292,8 +292,8 @@ def test_no_command_shows_the_help():
 def test_keys_lists_every_field(options):
     process = command("keys", *options)
     assert process.returncode == 0
-    for model in CASES.values():
-        for row in documented(model):
+    for name in RIGS:
+        for row in documented(rig(name).case):
             assert row.name in process.stdout
     process = command("keys", "nothing")
     assert process.returncode == 2

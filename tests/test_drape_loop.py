@@ -26,9 +26,8 @@ from fabric_fenicsx.loop.kinds.drape.shear_field import (
 )
 from fabric_fenicsx.loop.report.content import test_report as report_of
 from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
-from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session, control
-from fabric_fenicsx.rigs.drape import build
+from fabric_fenicsx.rigs.drape import DrapeCase, build
 from fabric_fenicsx.rigs.simulation import simulate
 from fabric_fenicsx.solving.parts import ContactLaw
 

@@ -17,8 +17,8 @@ from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.fabric.section import RectangularSection
 from fabric_fenicsx.mechanics.tools import HoledPlate
 from fabric_fenicsx.rigs import drape
-from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session
+from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
 from fabric_fenicsx.solving.model import Model, Support
 from fabric_fenicsx.solving.parts import ContactLaw

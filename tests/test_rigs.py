@@ -14,8 +14,9 @@ import pandas as pd
 import pytest
 
 from fabric_fenicsx.rigs import drape, picture_frame
-from fabric_fenicsx.rigs.cases import DrapeCase, PictureFrameCase
 from fabric_fenicsx.rigs.common import Session
+from fabric_fenicsx.rigs.drape import DrapeCase
+from fabric_fenicsx.rigs.picture_frame import PictureFrameCase
 
 DEMOS = Path(__file__).parents[1] / "demos"
 

@@ -11,8 +11,7 @@ from solve import Statics
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import WEFT
-from fabric_fenicsx.rigs.cantilever import strip
-from fabric_fenicsx.rigs.cases import CantileverCase
+from fabric_fenicsx.rigs.cantilever import CantileverCase, strip
 from fabric_fenicsx.rigs.common import Session, crossover_law, tow_net, tow_sections
 from fabric_fenicsx.rigs.load import load_case
 from fabric_fenicsx.solving.model import Model, Support

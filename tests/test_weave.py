@@ -35,8 +35,7 @@ from fabric_fenicsx.fabric.weave import (
     satin,
     twill,
 )
-from fabric_fenicsx.rigs.cases import SheetKeys
-from fabric_fenicsx.rigs.weave_keys import WeaveKeys, crossing_weights, layout, pattern
+from fabric_fenicsx.rigs.weave_keys import SheetKeys, WeaveKeys, crossing_weights, layout, pattern
 
 pytest.importorskip("gmsh")
 

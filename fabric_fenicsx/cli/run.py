@@ -65,7 +65,7 @@ def _run(
     from ..output.folder import prepare_folder
     from ..output.record import write_result
     from ..rigs.common import Session
-    from ..rigs.registry import RUNNERS
+    from ..rigs.registry import rig
     from ..rigs.write_case import case_text
     from ..terminal import following, summarise
 
@@ -74,7 +74,7 @@ def _run(
     with following(quiet=quiet or not root) as progress:
         session = Session(folder, comm, path.parent, started, progress, resume, pictures)
         session.case_text = case_text(case, path.parent)
-        result = RUNNERS[case.test](case, session)
+        result = rig(case.test).run(case, session)
     if root:
         write_result(folder, result)
         if not quiet:

@@ -12,8 +12,7 @@ from ..errors import InputError
 from .collective import collective, from_root
 
 if TYPE_CHECKING:
-    from ..loop.synthesise import Hidden
-    from ..rigs.cases import Case
+    from ..loop.synthesise import Case, Hidden
 
 __all__ = ["synthesise"]
 

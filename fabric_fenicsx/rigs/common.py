@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -18,16 +17,17 @@ import pandas as pd
 
 from ..errors import InputError
 from ..fabric.crossings import tow_numbers
-from ..fabric.gmsh_io import read_msh, write_msh
-from ..fabric.layout import TowLayout
+from ..fabric.gmsh_io import mesh_net, read_msh
 from ..fabric.net import WARP, WEFT, Net
+from ..fabric.paths import TowPaths
 from ..fabric.section import RectangularSection
-from ..fabric.sheet import Sheet
 from ..output.files import write_text
 from ..solving.model import Model
 from ..solving.parts import CrossoverLaw
+from ..solving.snapshot import Snapshot
 from ..solving.stepping import StepControl
-from .cases import Common, CrossoverKeys, SolverKeys, TowKeys
+from .cases import Case, CrossoverKeys, SolverKeys, TowKeys
+from .simulation import Run, simulate
 
 __all__ = [
     "Session",
@@ -35,6 +35,7 @@ __all__ = [
     "crossover_law",
     "extend",
     "section",
+    "simulated",
     "tow_net",
     "tow_sections",
     "write_table",
@@ -84,7 +85,7 @@ def section(keys: TowKeys) -> RectangularSection:
 
 
 def tow_sections(
-    case: Common, net: Net
+    case: Case, net: Net
 ) -> tuple[tuple[RectangularSection, ...], npt.NDArray[np.int64]]:
     """The sections of a case's tows, and which of them each tow of the net has, (n_tows,).
 
@@ -124,7 +125,7 @@ def crossover_law(keys: CrossoverKeys, warp_spacing: float, weft_spacing: float)
 
 
 def fabric_model(
-    case: Common, net: Net, spacings: tuple[float, float], session: Session, **rig: Any
+    case: Case, net: Net, spacings: tuple[float, float], session: Session, **rig: Any
 ) -> Model:
     """The model of a case's tows and crossings on its net. Collective.
 
@@ -157,9 +158,48 @@ def control(keys: SolverKeys, largest_move: float = math.inf) -> StepControl:
     )
 
 
-def tow_net(
-    case: Common, sheet: Sheet | TowLayout, session: Session, *, crossing_gap: float = 0.0
-) -> Net:
+def simulated(
+    case: Case,
+    model: Model,
+    session: Session,
+    *,
+    end: float,
+    control: StepControl,
+    stops: Sequence[float] = (),
+    measure: Callable[[Snapshot], dict[str, float]] = lambda snapshot: {},
+) -> Run:
+    """Run the model of a case to its end, or as far as it goes. Collective.
+
+    Args:
+        case: the case.
+        model: its model.
+        session: where and how it runs.
+        end: final time [s].
+        control: step lengths.
+        stops: times that steps must not jump over [s].
+        measure: further columns for each step's row, from its snapshot.
+
+    Raises:
+        InputError: there is nothing to resume.
+    """
+    return simulate(
+        model,
+        session.folder,
+        test=case.test,
+        end=end,
+        stops=stops,
+        control=control,
+        force_tolerance=case.solver.force_tolerance_N,
+        iteration_limit=case.solver.iteration_limit,
+        measure=measure,
+        progress=lambda time, step, its: session.progress(time / end, step, its),
+        resume=session.resume,
+        case_text=session.case_text,
+        started=session.started,
+    )
+
+
+def tow_net(case: Case, sheet: TowPaths, session: Session, *, crossing_gap: float = 0.0) -> Net:
     """The net of a case: from its .msh, or from the sheet by gmsh. Collective.
 
     Args:
@@ -179,10 +219,7 @@ def tow_net(
             if case.mesh is not None:
                 net = read_msh(session.base / case.mesh, crossing_gap=crossing_gap)
             else:
-                with tempfile.TemporaryDirectory() as folder:
-                    path = Path(folder) / "tows.msh"
-                    write_msh(sheet, path)
-                    net = read_msh(path, crossing_gap=crossing_gap)
+                net = mesh_net(sheet, crossing_gap=crossing_gap)
         except InputError as error:
             problem = str(error)
     problem = comm.bcast(problem)

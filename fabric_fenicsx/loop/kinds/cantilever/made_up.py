@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ....rigs.cases import CantileverCase
+from ....rigs.cantilever import CantileverCase
 from ...inference.effects import Effect
 from ...measurement.kind import MadeUp
 from ...measurement.schema import Measurement, Run, fabric_keys

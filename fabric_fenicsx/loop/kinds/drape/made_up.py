@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import InputError
-from ....rigs.cases import DrapeCase
+from ....rigs.drape import DrapeCase
 from ...inference.effects import Effect
 from ...measurement.kind import MadeUp
 from ...measurement.schema import Measurement, Run, fabric_keys

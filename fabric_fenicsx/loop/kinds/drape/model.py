@@ -28,7 +28,7 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import gaussian_filter
 
 from ....errors import SolveError
-from ....rigs.cases import DrapeCase
+from ....rigs.drape import DrapeCase
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Parameter, Variant
 from ...inference.experiment import Readings

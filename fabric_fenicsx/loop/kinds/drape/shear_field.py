@@ -17,9 +17,8 @@ from pydantic import ValidationError
 from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
 
 from ....errors import InputError, SolveError
-from ....rigs.cases import DrapeCase
 from ....rigs.common import Session, control
-from ....rigs.drape import build
+from ....rigs.drape import DrapeCase, build
 from ....rigs.simulation import simulate
 from ...measurement.schema import FILE, Measurement
 

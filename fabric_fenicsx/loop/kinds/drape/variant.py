@@ -16,7 +16,7 @@ class DrapeVariant(Variant):
     """An effect in a drape: other keys of its case, or other places on the sheet.
 
     Attributes:
-        changes: keys of the case (rigs.cases.DrapeCase) by their dotted names, of the value of the
+        changes: keys of the case (rigs.drape.DrapeCase) by their dotted names, of the value of the
             only parameter, an amplitude; it is not asked for at zero, the baseline.
         solved_at: values of the amplitude at which the drape is solved when it is needed, zero
             apart; in between it is interpolated. The bounds of the amplitude must not lie outside.

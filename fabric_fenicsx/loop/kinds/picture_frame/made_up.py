@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ....rigs.cases import PictureFrameCase
-from ....rigs.picture_frame import crosshead, duration
+from ....rigs.picture_frame import PictureFrameCase, crosshead, duration
 from ...inference.effects import Effect
 from ...measurement.kind import MadeUp
 from ...measurement.schema import Measurement, Run, fabric_keys
