@@ -143,6 +143,8 @@ class ConnectorFields(Fields):
         normal: the sheet's unit normal there.
         angle_0: in-plane angle beyond 90° between the tows before deformation [rad]; 0 in a weave.
         interlacing: share of the in-plane moments that acts at a crossing [-]; 1 in a plain weave.
+        offset: vector from the warp node to the weft node before deformation [mm]; None where it is
+            zero at every crossing of the net.
     """
 
     warp: Any
@@ -150,6 +152,7 @@ class ConnectorFields(Fields):
     normal: Any
     angle_0: Any
     interlacing: Any
+    offset: Any | None
 
     @property
     def point(self) -> Any:
@@ -160,10 +163,6 @@ class ConnectorFields(Fields):
         """Values at the warp node and at the weft node."""
         half = f.dx(0) / 2
         return f - half, f + half
-
-    def gap(self, w: Any) -> Any:
-        """Vector from the warp node to the weft node that has opened since the start [mm]."""
-        return self.u_n.dx(0) + translation_part(w.dx(0))
 
     def rotations(self, w: Any) -> tuple[Any, Any]:
         """Unit quaternions of the warp node and of the weft node after the increment w."""

@@ -161,6 +161,7 @@ class Discretisation:
         vectors = _dolfinx.constants_per_cell(mesh, 3)
         numbers = _dolfinx.constants_per_cell(mesh, 1)
         directions = self._crossing_directions()
+        offset = net.points[net.crossings[:, 1]] - net.points[net.crossings[:, 0]]
         return ConnectorFields(
             mesh=mesh,
             space=space,
@@ -172,6 +173,7 @@ class Discretisation:
             normal=self.crossing_field(vectors, directions["normal"]),
             angle_0=self.crossing_field(numbers, reference_angle(net)),
             interlacing=self.crossing_field(numbers, self.interlacing),
+            offset=self.crossing_field(vectors, offset) if offset.any() else None,
         )
 
     def nodal_directions(self) -> dict[str, Array]:
