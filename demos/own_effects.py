@@ -1,11 +1,16 @@
 # %% [markdown]
-# # Effects of one's own
+# # A law of one's own
 #
 # A stitched fabric: yarns through the crossings tighten over a small angle and then hold with a
 # constant moment, m = m_s tanh(γ / γ_s), on the way out as on the way back. No spring of the
 # baseline bends like that, and friction would lose its moment's work.
 #
+# A case takes the law at its crossings, a diagnosis tries it as an effect:
+#
 # ```
+# crossover:
+#   laws: [{law: own, file: own_effects.py, values: {m_s_N_mm: 0.02, tight_angle_deg: 3}}]
+#
 # fabric-fenicsx diagnose my_fabric --effects-from demos/own_effects.py
 # ```
 
@@ -13,57 +18,49 @@
 from dataclasses import dataclass
 from typing import Any
 
-from ufl import tanh
+from ufl import cosh, ln, tanh
 
-from fabric_fenicsx.loop.inference.effects import Effect, Parameter
-from fabric_fenicsx.loop.kinds.picture_frame.variant import FrameVariant
-from fabric_fenicsx.mechanics.shear_laws import Crossing
+from fabric_fenicsx.inputs.parameters import Parameter
+from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw, Form, in_degrees, per_area
 
 # %% [markdown]
-# A shear law is a moment in UFL, of the shear angle and its rate, here per area of fabric [N]. Its
-# derivatives are not needed: they are taken from the expression. A law that remembers names what
-# it remembers in `history`.
+# The numbers come first, with their keys in a case. A form says what is fitted in a picture frame:
+# the amplitude is zero where the effect is absent; every other number has values from which a fit
+# begins, and bounds; the unit stands at the end of its name. The moment is an expression in UFL of
+# the shear angle, whose derivatives are taken from it. What is stored is not booked as lost.
 
 
 # %%
 @dataclass(frozen=True)
-class Stitches:
-    """m = m_s tanh(γ / γ_s), elastic."""
+class Stitches(CrossingLaw):
+    """M = m_s tanh(γ / γ_s), elastic."""
 
-    limit: Any
-    angle: Any
-    name: str = "stitches"
+    limit: Any = per_area("m_s_N_mm", "moment per area once tight")
+    angle: Any = in_degrees("tight_angle_deg", "until tight")
 
-    def moment(self, at: Crossing) -> Any:
-        """Moment per area [N]."""
-        return self.limit * tanh(at.gamma / self.angle)
-
-    def history(self, at: Crossing) -> dict[str, Any]:
-        """None."""
-        return {}
-
-
-# %% [markdown]
-# The amplitude is zero where the effect is absent. Every other number has values from which a fit
-# begins, and bounds; the unit stands at the end of its name.
-
-# %%
-EFFECTS = [
-    Effect(
-        name="stitch_tightening",
-        test="picture_frame",
-        meaning="stitching yarns tighten over a small angle and then hold",
-        variants=(
-            FrameVariant(
-                "tanh",
-                (
-                    Parameter("m_s_N", lower=0.0, amplitude=True, meaning="moment once tight"),
-                    Parameter(
+    forms = (
+        Form(
+            "stitch_tightening",
+            "tanh",
+            (
+                {
+                    "limit": Parameter(
+                        "m_s_N", lower=0.0, amplitude=True, meaning="moment once tight"
+                    ),
+                    "angle": Parameter(
                         "tight_angle_rad", (0.03, 0.1, 0.2), 0.01, 0.5, meaning="until tight"
                     ),
-                ),
-                laws=lambda p: (Stitches(p["m_s_N"], p["tight_angle_rad"]),),
+                },
             ),
+            meaning="stitching yarns tighten over a small angle and then hold",
         ),
     )
-]
+
+    def moment(self, at: Crossing) -> Any:
+        """Moment that resists γ."""
+        return at.number(self.limit) * tanh(at.gamma / at.number(self.angle))
+
+    def energy(self, gamma: Any, memory: Any, number: Any) -> Any:
+        """∫ M dγ."""
+        angle = number(self.angle)
+        return number(self.limit) * angle * ln(cosh(gamma / angle))

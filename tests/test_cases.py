@@ -206,9 +206,9 @@ def test_long_values_are_shortened():
     [
         (
             "[{law: dahl, limit_N_mm: 1}]",
-            "crossover.laws.0.law: 'dahl', allowed is tabulated_spring",
+            "crossover.laws.0.law: 'dahl', allowed is compaction",
         ),
-        ("[{limit_N_mm: 1}]", "crossover.laws.0.law: missing, allowed is tabulated_spring"),
+        ("[{limit_N_mm: 1}]", "crossover.laws.0.law: missing, allowed is compaction"),
         (
             "[{law: locking, angle_deg: -1, k_N_mm: 1}]",
             "angle_deg: -1, allowed is a number greater than 0",

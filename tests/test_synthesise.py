@@ -10,6 +10,9 @@ import pytest
 import yaml
 from test_diagnose import command, report_of
 
+from fabric_fenicsx.errors import InputError
+from fabric_fenicsx.loop.inference.effects import read_effects
+
 DEMOS = Path(__file__).parents[1] / "demos"
 CASE, OWN = DEMOS / "picture_frame.yaml", DEMOS / "own_effects.py"
 
@@ -135,12 +138,15 @@ def test_a_hidden_turn_of_a_clamp_is_found(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('name="stitch_tightening"', 'name="load_drift"', "load_drift: stands twice"),
-        ('test="picture_frame"', 'test="bias"', "'bias', allowed is picture_frame"),
+        ('"stitch_tightening"', '"load_drift"', "load_drift: stands twice"),
         ("(0.03, 0.1, 0.2)", "()", "tight_angle_rad: no starts"),
-        ("self.limit * tanh", "self.limit * tan", "stitch_tightening, tanh: cannot be evaluated"),
-        ("EFFECTS = [", "FFECTS = [", "EFFECTS: missing"),
-        ("from ufl import tanh", "from ufl import tan_h", "ImportError"),
+        (
+            "(self.limit) * tanh",
+            "(self.limit) * tan",
+            "stitch_tightening, tanh: cannot be evaluated",
+        ),
+        ("    forms = (", "    fforms = (", "no effects, allowed is a CrossingLaw with forms"),
+        ("ln, tanh", "ln, tan_h", "ImportError"),
     ],
 )
 def test_a_broken_file_of_effects_is_one_line(old, new, says, tmp_path, capsys):
@@ -154,6 +160,25 @@ def test_a_broken_file_of_effects_is_one_line(old, new, says, tmp_path, capsys):
     assert line.count("\n") == 1 and says in line
     assert str(path) in line or "--effects-from" in line
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("effects", "says"),
+    [
+        ("[Effect('x', 'bias', '', (FrameVariant('y', ()),))]", "'bias', allowed is picture_frame"),
+        ("3", "EFFECTS, allowed is a list"),
+        ("[]", "no effects"),
+    ],
+)
+def test_a_list_of_effects(effects, says, tmp_path):
+    """Beside laws, or instead of them, a file may have a list."""
+    path = tmp_path / "mine.py"
+    head = "from fabric_fenicsx.loop.inference.effects import Effect, FrameVariant\n"
+    path.write_text(f"{head}EFFECTS = {effects}\n")
+    with pytest.raises(InputError, match=says):
+        read_effects(path)
+    path.write_text(OWN.read_text() + head + "EFFECTS = [Effect('x', 'picture_frame', '', ())]\n")
+    assert [effect.name for effect in read_effects(path)] == ["stitch_tightening", "x"]
 
 
 def test_strengths_that_are_not_given_are_visible(tmp_path, capsys):

@@ -618,7 +618,8 @@ def test_a_plain_weave_changes_nothing(tmp_path):
         flat = net_of(centred_sheet(288.0, 288.0, 12.0, 12.0, quarter=quarter), tmp_path)
         for field in fields(net):
             np.testing.assert_array_equal(getattr(net, field.name), getattr(flat, field.name))
-        np.testing.assert_allclose(crossing_weights(keys, sheet, net), 1.0, rtol=1e-12)
+        for weights in crossing_weights(keys, sheet, net).values():
+            np.testing.assert_allclose(weights, 1.0, rtol=1e-12)
 
 
 def test_weights_of_a_weave(tmp_path):
@@ -627,14 +628,14 @@ def test_weights_of_a_weave(tmp_path):
     for law, mean in (("plain", 0.4), ("this", 1.0)):
         keys = WeaveKeys(pattern="satin_5", shear_law_of=law)
         net = net_of(layout(keys, sheet, quarter=False), tmp_path)
-        weights = crossing_weights(keys, sheet, net)
+        weights = crossing_weights(keys, sheet, net)["interlacing"]
         np.testing.assert_allclose(weights.mean(), mean, rtol=1e-12)
         assert weights.max() == pytest.approx(4.0 * weights.min())
     # Two stitches 40 mm apart share the 120 mm of each of ten warp tows 12 mm apart.
     keys = WeaveKeys(pattern="unidirectional", weft_spacings_mm=[40.0])
     net = net_of(layout(keys, sheet, quarter=False), tmp_path)
-    weights = crossing_weights(keys, sheet, net)
-    np.testing.assert_allclose(weights * 144.0, np.full(20, 12.0 * 60.0), rtol=1e-9)
+    for weights in crossing_weights(keys, sheet, net).values():
+        np.testing.assert_allclose(weights * 144.0, np.full(20, 12.0 * 60.0), rtol=1e-9)
 
 
 def test_keys_name_draw_or_list_a_weave(tmp_path):

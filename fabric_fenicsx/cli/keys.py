@@ -56,12 +56,14 @@ def _print_table(
     from rich.markup import escape
     from rich.table import Table
 
+    console = Console()
+    # Piped, there is no width to keep to; on a narrow terminal long keys are folded.
+    width = console.width if console.is_terminal else 180
     table = Table(title=f"{name}: {text}", title_justify="left")
     for heading in headings:
         wide = heading in ("allowed", "meaning")
-        table.add_column(heading, no_wrap=heading == "key", overflow="fold", ratio=1 if wide else 0)
+        whole = heading == "key" and width >= 140
+        table.add_column(heading, no_wrap=whole, overflow="fold", ratio=1 if wide else 0)
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))
-    console = Console()
-    # Piped, there is no width to keep to.
-    console.print(table, width=None if console.is_terminal else 160)
+    Console(width=width).print(table)

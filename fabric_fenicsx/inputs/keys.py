@@ -18,12 +18,14 @@ __all__ = [
     "group_of",
     "plain",
     "unit",
-    "variant_of",
     "variants",
 ]
 
 UNITS = {
     "kg_mm3": "kg/mm³",
+    "1_rad2": "1/rad²",
+    "1_rad": "1/rad",
+    "rad_s": "rad/s",
     "N_s_mm": "N s/mm",
     "N_mm2": "N/mm²",
     "mm_s2": "mm/s²",
@@ -62,6 +64,10 @@ def documented(model: type[BaseModel], prefix: str = "") -> Iterator[Key]:
             end = "[]." if _is_list(field.annotation) else "."
             yield from documented(group, dotted + end)
             continue
+        for tag, variant in variants(field.annotation).items():
+            yield from documented(variant, f"{dotted}[{tag}].")
+        if variants(field.annotation):
+            continue
         yield Key(
             dotted, unit(name), _default(field), allowed_by(field), " ".join(_description(field))
         )
@@ -86,30 +92,18 @@ def group_of(annotation: Any) -> type[BaseModel] | None:
     return None
 
 
-def variant_of(annotation: Any, tag: str) -> type[BaseModel] | None:
-    """Of several groups that a key tells apart, the one with this value of it."""
-    while get_origin(annotation) is Annotated:
-        annotation = get_args(annotation)[0]
-    if get_origin(annotation) not in (Union, types.UnionType):
-        return None
-    for part in get_args(annotation):
-        if isinstance(part, type) and issubclass(part, BaseModel):
-            kinds = (field.annotation for field in part.model_fields.values())
-            if any(tag in get_args(kind) for kind in kinds if get_origin(kind) is Literal):
-                return part
-    return None
-
-
-def variants(annotation: Any) -> list[str]:
-    """The values of the key that tells groups apart."""
-    while get_origin(annotation) is Annotated:
-        annotation = get_args(annotation)[0]
-    names: list[str] = []
-    for part in get_args(annotation):
-        for field in part.model_fields.values():
-            if get_origin(field.annotation) is Literal:
-                names += get_args(field.annotation)
-    return names
+def variants(annotation: Any) -> dict[str, type[BaseModel]]:
+    """The groups that the value of a key tells apart, by that value; also of a list's entries."""
+    if get_origin(annotation) is list or get_origin(annotation) is Annotated:
+        return variants(get_args(annotation)[0])
+    found: dict[str, type[BaseModel]] = {}
+    if get_origin(annotation) in (Union, types.UnionType):
+        for part in get_args(annotation):
+            if isinstance(part, type) and issubclass(part, BaseModel):
+                kinds = (field.annotation for field in part.model_fields.values())
+                tags = (get_args(kind) for kind in kinds if get_origin(kind) is Literal)
+                found |= {tag: part for several in tags for tag in several}
+    return found
 
 
 def allowed_by(field: FieldInfo) -> str:
@@ -132,8 +126,8 @@ def allowed(annotation: Any, metadata: Sequence[Any] = ()) -> str:
     if origin is list:
         return f"a list, each entry {allowed(arguments[0])}"
     if origin is dict:
-        return "a mapping of names to text"
-    if group_of(annotation) is not None:
+        return f"a mapping of names to {'text' if arguments[1] is str else 'values'}"
+    if group_of(annotation) is not None or variants(annotation):
         return "a group of keys"
     if annotation is bool:
         return "true or false"

@@ -11,7 +11,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError
-from .keys import allowed, allowed_by, group_of, one_of, plain, variant_of, variants
+from .keys import allowed, allowed_by, group_of, one_of, plain, variants
 
 __all__ = [
     "Place",
@@ -139,19 +139,26 @@ def parse_yaml(text: str, origin: str, *, places: bool) -> Any:
         raise InputError(one_line(f"{origin}: {error}; allowed is plain YAML")) from None
 
 
-def mistakes(model: type[BaseModel], data: Any) -> tuple[Any, list[tuple[Place, str]]]:
+def mistakes(
+    model: type[BaseModel], data: Any, base: Path = Path()
+) -> tuple[Any, list[tuple[Place, str]]]:
     """Check data against the model of its keys.
+
+    Args:
+        model: of the keys.
+        data: what a file says.
+        base: folder that names of files count from where they are read at once.
 
     Returns:
         The validated keys, or None where there are mistakes; place and plain text of each.
     """
-    found = [
-        (place, f"{dotted_place(place)}: {plain(value)}, allowed is {_resolve(model, place)[0]}")
-        for place, value in _booleans(model, data)
-    ]
+    found = []
+    for loc, value in _booleans(model, data):
+        words, _, place = _resolve(model, loc)
+        found.append((place, f"{dotted_place(place)}: {plain(value)}, allowed is {words}"))
     keys = None
     try:
-        keys = model.model_validate(data)
+        keys = model.model_validate(data, context={"base": base})
     except ValidationError as error:
         found += [_explained(model, dict(problem)) for problem in error.errors()]
     return (None if found else keys), found
@@ -159,23 +166,22 @@ def mistakes(model: type[BaseModel], data: Any) -> tuple[Any, list[tuple[Place, 
 
 def _explained(model: type[BaseModel], problem: dict[str, Any]) -> tuple[Place, str]:
     """Place and plain text of what pydantic found."""
-    place: Place = tuple(problem["loc"])
+    words, group, place = _resolve(model, tuple(problem["loc"]))
     kind, value = problem["type"], problem["input"]
     if kind == "extra_forbidden":
-        group = _resolve(model, place[:-1])[1]
+        group = _resolve(model, tuple(problem["loc"][:-1]))[1]
         names = [field.alias or name for name, field in group.model_fields.items()] if group else []
         close = suggestion(str(place[-1]), names)
         listed = one_of(sorted(names, key=lambda name: f" {name}?" not in close))
         return place, f"{dotted_place(place)}: unknown key{close}, allowed are {listed}"
-    if kind == "invalid_key":
+    if kind == "invalid_key" or place[-1:] == ("[key]",):
         place = tuple(part for part in place if part != "[key]")
         return place, f"{dotted_place(place)}: a key that is no text, allowed is the name of a key"
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         name = problem["ctx"]["discriminator"].strip("'")
-        tags = variants(_annotation(model, place[:-1]))
+        tags = list(variants(_annotation(model, place[:-1])))
         found = plain(value.get(name)) if isinstance(value, dict) and name in value else "missing"
         return place, f"{dotted_place((*place, name))}: {found}, allowed is {one_of(tags)}"
-    words, group = _resolve(model, place)
     if kind == "value_error" and group is not None:
         reason = str(problem["ctx"]["error"])
         return place, f"{dotted_place(place)}: {reason}" if place else reason
@@ -185,15 +191,22 @@ def _explained(model: type[BaseModel], problem: dict[str, Any]) -> tuple[Place, 
     return place, f"{dotted_place(place)}: {shown}, allowed is {words or problem['msg']}"
 
 
-def _resolve(model: type[BaseModel], place: Place) -> tuple[str | None, type[BaseModel] | None]:
-    """What is allowed at a place, and its model if it is a group of keys."""
+def _resolve(
+    model: type[BaseModel], loc: Place
+) -> tuple[str | None, type[BaseModel] | None, Place]:
+    """What is allowed at a place of pydantic's, its model if it is a group of keys, and the place.
+
+    Pydantic names, beside the keys, which of several groups an entry has been taken for.
+    """
+    place: Place = ()
     words: str | None = None
     group: type[BaseModel] | None = model
     annotation: Any = model
-    for part in place:
+    for i, part in enumerate(loc):
+        place = (*place, part)
         if isinstance(part, int):
             if get_origin(annotation) is not list:
-                return words, group
+                return words, group, (*place, *loc[i + 1 :])
             annotation = get_args(annotation)[0]
             words = allowed(annotation)
         elif group is not None and part in group.model_fields:
@@ -201,15 +214,15 @@ def _resolve(model: type[BaseModel], place: Place) -> tuple[str | None, type[Bas
             annotation = field.annotation
             words = allowed_by(field)
         elif get_origin(annotation) is dict:
-            return "text", None
-        elif (variant := variant_of(annotation, str(part))) is not None:
-            group, words = variant, None
+            return allowed(get_args(annotation)[1]), None, (*place, *loc[i + 1 :])
+        elif (variant := variants(annotation).get(str(part))) is not None:
+            group, words, place = variant, None, place[:-1]
             continue
         else:
-            return None, None
+            return None, None, (*place, *loc[i + 1 :])
         whole = get_origin(annotation) is not list
         group = group_of(annotation) if whole else None
-    return words, group
+    return words, group, place
 
 
 def _annotation(model: type[BaseModel], place: Place) -> Any:
@@ -222,16 +235,24 @@ def _annotation(model: type[BaseModel], place: Place) -> Any:
 
 
 def _booleans(model: type[BaseModel], data: Any, above: Place = ()) -> Iterator[tuple[Place, bool]]:
-    """Places where YAML gave true or false for a number, which pydantic would take for 1 or 0."""
+    """Where YAML gave true or false for a number, which pydantic would take for 1 or 0.
+
+    The places are pydantic's, see _resolve.
+    """
     if not isinstance(data, dict):
         return
     for name, field in model.model_fields.items():
         value, group = data.get(name), group_of(field.annotation)
+        told_apart = variants(field.annotation)
         entries = [((*above, name), value)]
         if isinstance(value, list):
             entries = [((*above, name, i), entry) for i, entry in enumerate(value)]
         for place, entry in entries:
-            if group is not None:
+            if told_apart:
+                tags = [tag for tag in told_apart if tag in getattr(entry, "values", list)()]
+                for tag in tags[:1]:
+                    yield from _booleans(told_apart[tag], entry, (*place, tag))
+            elif group is not None:
                 yield from _booleans(group, entry, place)
             elif isinstance(entry, bool) and "number" in allowed_by(field):
                 yield place, entry

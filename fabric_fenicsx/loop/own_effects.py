@@ -2,37 +2,37 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 
 from ..errors import InputError
 from ..inputs.keys import one_of
+from ..inputs.python_file import classes_of, run_file
+from ..mechanics.laws.law import CrossingLaw
 from .inference.effects import Effect
 from .kinds import KINDS
+from .kinds.picture_frame.variant import law_effects
 
 __all__ = ["read_effects"]
 
 
 def read_effects(path: Path) -> list[Effect]:
-    """A user's own effects, from the list ``EFFECTS`` of a Python file. It is run.
+    """A user's own effects: laws of a crossing with forms, and what a list ``EFFECTS`` adds.
+
+    Args:
+        path: a Python file. It is run.
 
     Raises:
-        InputError: the file cannot be run or has no such list.
+        InputError: the file cannot be run or has no effects.
     """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, allowed is a Python file with a list EFFECTS")
-    spec = importlib.util.spec_from_file_location(f"effects_of_{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise InputError(f"{path}: no Python file, allowed is a name that ends in .py")
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(f"{path}: {reason}") from error
-    effects = getattr(module, "EFFECTS", None)
+    module = run_file(path, "effects")
+    effects = getattr(module, "EFFECTS", ())
     if not isinstance(effects, (list, tuple)) or not all(isinstance(e, Effect) for e in effects):
-        raise InputError(f"{path}: EFFECTS: missing, allowed is a list of Effect")
+        raise InputError(f"{path}: EFFECTS, allowed is a list of Effect")
+    effects = [*law_effects(classes_of(module, CrossingLaw)), *effects]
+    if not effects:
+        raise InputError(
+            f"{path}: no effects, allowed is a CrossingLaw with forms, or a list EFFECTS"
+        )
     for effect in effects:
         tests = [kind.name for kind in KINDS]
         if effect.test not in tests:
@@ -45,4 +45,4 @@ def read_effects(path: Path) -> list[Effect]:
                     f"{path}: {effect.name}: {p.name}: no starts, allowed is one or more of them "
                     "unless it is an amplitude"
                 )
-    return list(effects)
+    return effects

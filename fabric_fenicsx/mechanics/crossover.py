@@ -1,6 +1,6 @@
 """Crossovers: what joins a warp and a weft tow where they cross (Wei & Zhang, Figure 1b).
 
-Three translational springs, in-plane moments M(γ, γ̇, ...) from mechanics.shear_laws, and a term
+Three translational springs, in-plane moments M(γ, γ̇, ...) from mechanics.laws, and a term
 that keeps the two sheet normals aligned: with the in-plane spring alone a tow could spin freely
 about its own axis.
 
@@ -32,7 +32,6 @@ __all__ = [
     "alignment_term",
     "crossing_values",
     "opening_energy",
-    "rotational_energy",
     "shear_angle",
     "shear_angle_change",
     "turning_term",
@@ -117,10 +116,11 @@ def turning_term(
     angle: Any,
     change: Jet,
     *,
+    share: Any,
     energy: Any = None,
     loss: Any = None,
 ) -> Term:
-    """An in-plane moment M(γ) at the crossings: work M δγ, weighted by interlacing.
+    """An in-plane moment M(γ) at the crossings: work M δγ, weighted by a share.
 
     Args:
         name: how reports call it.
@@ -128,8 +128,9 @@ def turning_term(
         moment: M [N mm], an expression in the angle.
         angle: γ as a ``ufl.variable``.
         change: its derivatives.
-        energy: stored energy, a form.
-        loss: Δγ over the step [rad] where M Δγ is lost; otherwise None.
+        share: of the moment that acts at a crossing [-].
+        energy: stored at a crossing [N mm], if any is.
+        loss: lost at a crossing over the step [N mm], if any is.
     """
     slope = diff(moment, angle)
     first = [moment * change_i for change_i in change.first]
@@ -137,16 +138,11 @@ def turning_term(
         (i, j): slope * change.first[i] * change.first[j] + moment * change_ij
         for (i, j), change_ij in change.second.items()
     }
-    share = fields.interlacing
     residual, tangent = _forms(fields, first, second, share)
-    lost = None if loss is None else share * moment * loss * fields.point
-    return Term(name, "crossovers", residual, tangent, energy, lost, symmetric=True)
-
-
-def rotational_energy(fields: ConnectorFields, k1: Any, k3: Any) -> Any:
-    """Energy of the in-plane spring, k1 γ²/2 + k3 γ⁴/4 [N mm]."""
-    gamma = shear_angle(fields, fields.w)
-    return fields.interlacing * (k1 * gamma**2 / 2 + k3 * gamma**4 / 4) * fields.point
+    stored, lost = (
+        None if part is None else share * part * fields.point for part in (energy, loss)
+    )
+    return Term(name, "crossovers", residual, tangent, stored, lost, symmetric=True)
 
 
 def alignment_term(fields: ConnectorFields, k: Any) -> Term:

@@ -142,7 +142,9 @@ class ConnectorFields(Fields):
         warp, weft: unit tangents of the tows before deformation, per crossing.
         normal: the sheet's unit normal there.
         angle_0: in-plane angle beyond 90° between the tows before deformation [rad]; 0 in a weave.
-        interlacing: share of the in-plane moments that acts at a crossing [-]; 1 in a plain weave.
+        interlacing: share of the in-plane moments that acts at a crossing [-] where they are due to
+            how the tows float over each other; 1 in a plain weave.
+        patch: share of the others, which differs from 1 where a crossing stands for another area.
         offset: vector from the warp node to the weft node before deformation [mm]; None where it is
             zero at every crossing of the net.
     """
@@ -152,6 +154,7 @@ class ConnectorFields(Fields):
     normal: Any
     angle_0: Any
     interlacing: Any
+    patch: Any
     offset: Any | None
 
     @property

@@ -1,6 +1,6 @@
 """UFL of scalars on numpy arrays: laws of one crossing without a mesh.
 
-A law of mechanics.shear_laws is an expression in γ, γ̇ and numbers. Here the same expression, with
+A law of mechanics.laws is an expression in γ, γ̇ and numbers. Here the same expression, with
 symbols in their place, becomes a function of arrays; its derivatives in any symbol are UFL's.
 """
 

@@ -93,8 +93,7 @@ class CrossoverKeys(Keys):
     )
     laws: list[ShearLawKeys] = Field(
         default_factory=list,
-        description="further in-plane moments: tabulated_spring, power_dashpot, tabulated_dashpot, "
-        "maxwell, coulomb_friction, dahl_friction, locking, compaction",
+        description="further in-plane moments, any of these as often as there are causes",
     )
 
 

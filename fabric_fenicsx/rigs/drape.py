@@ -249,7 +249,7 @@ def build(case: DrapeCase, session: Session) -> Model:
         contact_law=contact_law(case.contact),
         pressed=pressed(case),
         supports=symmetry_planes(net) if case.symmetry == "quarter" else (),
-        interlacing=None if weave is None else crossing_weights(weave, keys, net, session.base),
+        **({} if weave is None else crossing_weights(weave, keys, net, session.base)),
     )
 
 

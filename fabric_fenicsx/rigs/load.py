@@ -51,7 +51,7 @@ def load_case(path: Path, settings: Sequence[str] = ()) -> Case:
         origin = OPTION if ("test",) in changed else path
         raise InputError(one_line(f"{origin}: test: {shown}, allowed is {_tests()}"))
     found = rig(test)
-    case, problems = mistakes(found.case, data)
+    case, problems = mistakes(found.case, data, path.parent)
     if not problems and (reason := _no_sheet(found, case)):
         problems = [((), reason)]
     if problems:

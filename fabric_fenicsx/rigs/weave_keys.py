@@ -118,22 +118,21 @@ def layout(keys: WeaveKeys, sheet: SheetKeys, *, quarter: bool, base: Path = Pat
 
 def crossing_weights(
     keys: WeaveKeys, sheet: SheetKeys, net: Net, base: Path = Path()
-) -> npt.NDArray[np.float64]:
-    """Factor on the in-plane moments of each crossing, for `Model(interlacing=...)`.
-
-    Interlacing, by the mean one of the repeat where the laws are this weave's own, times the area
-    of the crossing over sheet.warp_spacing_mm · sheet.weft_spacing_mm, by which the laws per area
-    are multiplied elsewhere.
+) -> dict[str, npt.NDArray[np.float64]]:
+    """Factors on the in-plane moments of each crossing, for `Model(**...)`.
 
     Returns:
-        Shape (n_crossings,); 1 in a plain weave of evenly spaced tows at right angles.
+        "patch", the area of the crossing over sheet.warp_spacing_mm · sheet.weft_spacing_mm, by
+        which the laws per area are multiplied elsewhere, and "interlacing", the same times the
+        interlacing, by the mean one of the repeat where the laws are this weave's own. Each
+        (n_crossings,); 1 in a plain weave of evenly spaced tows at right angles.
     """
     weave = pattern(keys, base)
     share = weave.interlacing(*crossing_numbers(net))
     if keys.shear_law_of == "this":
         share = share / weave.mean_interlacing
-    weights: npt.NDArray[np.float64] = share * areas(net)
-    return weights / (sheet.warp_spacing_mm * sheet.weft_spacing_mm)
+    patch = areas(net) / (sheet.warp_spacing_mm * sheet.weft_spacing_mm)
+    return {"patch": patch, "interlacing": share * patch}
 
 
 def _outline(keys: WeaveKeys, sheet: SheetKeys) -> Outline:

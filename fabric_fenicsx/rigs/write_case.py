@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 from textwrap import wrap
-from typing import Any, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from ..inputs.keys import allowed_by, group_of, unit
+from ..inputs.keys import allowed_by, group_of, unit, variants
 from .cases import Case
 from .registry import rig
 
 __all__ = ["case_text", "template"]
 
-FILES = (".msh", ".stl", ".txt", ".csv")
+FILES = (".msh", ".stl", ".txt", ".csv", ".py")
 """Endings of values that name a file."""
 
 WIDTH = 110
@@ -73,8 +73,9 @@ def _group(model: type[BaseModel], depth: int) -> Iterator[str]:
         field = fields[name]
         value = field.get_default(call_default_factory=True)
         if value is PydanticUndefined:
-            tags = get_args(field.annotation)
-            yield from _entry(f"{name}: {tags[0] if tags else ''}", field, depth)
+            literal = get_origin(field.annotation) is Literal
+            tag = get_args(field.annotation)[0] if literal else ""
+            yield from _entry(f"{name}: {tag}", field, depth)
         elif name in inner:
             yield ""
             yield from _comment(field.description or "", depth)
@@ -84,10 +85,11 @@ def _group(model: type[BaseModel], depth: int) -> Iterator[str]:
             yield from (f"{mark}{line}" for line in block)
         elif value is None or value in ("", [], {}):
             yield from _entry(f"# {name}:", field, depth)
-            if (group := group_of(field.annotation)) is not None:
+            group = group_of(field.annotation)
+            for entry in [group] if group is not None else variants(field.annotation).values():
                 # An entry of a list of groups, to be filled in.
                 yield "  " * depth + "#   -"
-                yield from ("  " * depth + f"# {line}" for line in _group(group, 2))
+                yield from ("  " * depth + f"# {line}" for line in _group(entry, 2))
         else:
             yield from _entry(f"{name}: {_plain(value)}", field, depth)
 
@@ -111,7 +113,9 @@ def _about(line: str, field: FieldInfo) -> str:
     words = " ".join((field.description or "which rig").split())
     name = line.removeprefix("# ").partition(":")[0]
     label = f" [{unit(name)}]" if unit(name) else ""
-    return f"{words}{label}; {allowed_by(field)}"
+    # What tells groups apart stands there as it is.
+    fixed = get_origin(field.annotation) is Literal and field.is_required()
+    return words if fixed else f"{words}{label}; {allowed_by(field)}"
 
 
 def _plain(value: Any) -> str:

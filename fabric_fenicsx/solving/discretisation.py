@@ -54,7 +54,8 @@ class Discretisation:
         stiffness: section stiffnesses per cell of the net, shape (n_cells, 6) [N, N mm²].
         mass: mass and three rotary inertias per cell, shape (n_cells, 4) [tonne/mm, tonne mm].
         comm: communicator of the run.
-        interlacing: share of the in-plane moments at each crossing; by default 1, (n_crossings,).
+        interlacing, patch: shares of the in-plane moments at each crossing, see
+            mechanics.fields; by default 1, (n_crossings,).
 
     Attributes:
         tows: fields on the tow mesh.
@@ -72,10 +73,13 @@ class Discretisation:
         mass: Array,
         comm: MPI.Comm,
         interlacing: Array | None = None,
+        patch: Array | None = None,
     ) -> None:
         _keep_copy(comm)
         self.net, self.comm = net, comm
-        self.interlacing = np.ones(len(net.crossings)) if interlacing is None else interlacing
+        whole = np.ones(len(net.crossings))
+        self.interlacing = whole if interlacing is None else interlacing
+        self.patch = whole if patch is None else patch
         mesh = _dolfinx.interval_mesh(comm, net.points, net.cells)
         space = _dolfinx.lagrange(mesh, BLOCK)
         self._number(mesh, space)
@@ -173,6 +177,7 @@ class Discretisation:
             normal=self.crossing_field(vectors, directions["normal"]),
             angle_0=self.crossing_field(numbers, reference_angle(net)),
             interlacing=self.crossing_field(numbers, self.interlacing),
+            patch=self.crossing_field(numbers, self.patch),
             offset=self.crossing_field(vectors, offset) if offset.any() else None,
         )
 

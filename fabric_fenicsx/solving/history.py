@@ -42,7 +42,11 @@ class Histories:
             where: constant per "cells" or "crossings", or at the "nodes".
             field: the function that holds it; None on a rank without crossings.
             expression: its next value (UFL).
+
+        Raises:
+            ValueError: the name is there already.
         """
+        self._check_new(name)
         disc = self.disc
         form = None
         if field is not None:
@@ -66,8 +70,16 @@ class Histories:
         Args:
             name: unique; names the array in step files.
             values: the same on every rank, in an array that stays the same object.
+
+        Raises:
+            ValueError: the name is there already.
         """
+        self._check_new(name)
         self._numbers[name] = values
+
+    def _check_new(self, name: str) -> None:
+        if name in self._entries or name in self._numbers:
+            raise ValueError(f"{name}: remembered twice")
 
     def update(self) -> None:
         """Evaluate every expression, then change the fields."""

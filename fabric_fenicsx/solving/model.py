@@ -75,7 +75,9 @@ class Model:
         pressed: tools pushed downwards by a force [N] at a time, by their names, instead of by
             their paths; see solving.pressed.
         supports: prescribed motions.
-        interlacing: share of the in-plane moments at each crossing, (n_crossings,); by default 1.
+        interlacing: share of the in-plane moments at each crossing, (n_crossings,), where they are
+            due to how the tows float over each other; by default 1.
+        patch: share of the other moments; by default 1.
         extra: further terms, from the fields of the tows and of the connectors (None on a rank
             without crossings); returns as many terms on every rank.
         comm: communicator.
@@ -99,6 +101,7 @@ class Model:
         pressed: Mapping[str, Callable[[float], float]] | None = None,
         supports: Sequence[Support] = (),
         interlacing: Array | None = None,
+        patch: Array | None = None,
         extra: Callable[[TowFields, ConnectorFields | None], Sequence[Term]] | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
@@ -109,7 +112,7 @@ class Model:
         self.net, self.comm = net, comm
         self.time = 0.0
         self._supports = list(supports)
-        self.disc = Discretisation(net, stiffness, mass, comm, interlacing)
+        self.disc = Discretisation(net, stiffness, mass, comm, interlacing, patch)
         self.fields = self.disc.tows
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
         self._full_gravity, self._load = np.array(gravity), load

@@ -13,7 +13,9 @@ from ufl import variable
 from .. import _dolfinx
 from .._dolfinx import Function
 from ..mechanics import contact, crossover, slip
-from ..mechanics.shear_laws import Crossing, LinearDashpot, PolynomialSpring, ShearLaw
+from ..mechanics.laws.dashpots import LinearDashpot
+from ..mechanics.laws.law import Crossing, CrossingLaw
+from ..mechanics.laws.springs import PolynomialSpring
 from ..mechanics.terms import Term, energy_term, work_term
 from ..mechanics.tools import SampledTool, Tool
 from .discretisation import BLOCK, Discretisation
@@ -34,7 +36,7 @@ class CrossoverLaw:
         k1, k3: in-plane spring M = k1 γ + k3 γ³ [N mm].
         dashpot: β of M = β γ̇ [N mm s].
         alignment: restoring moment of the sheet normals per sine of their tilt [N mm].
-        laws: further in-plane moments, see mechanics.shear_laws.
+        laws: further in-plane moments, see mechanics.laws; several of a kind if need be.
         slip_limit: force at which the springs slip in the plane of the sheet [N], see
             mechanics.slip; None: never.
     """
@@ -44,7 +46,7 @@ class CrossoverLaw:
     k3: float
     dashpot: float
     alignment: float
-    laws: tuple[ShearLaw, ...] = ()
+    laws: tuple[CrossingLaw, ...] = ()
     slip_limit: float | None = None
 
 
@@ -82,14 +84,12 @@ class Crossings:
 
     def __init__(self, disc: Discretisation, law: CrossoverLaw, histories: Histories) -> None:
         self.disc = disc
-        turning: tuple[ShearLaw, ...] = (
-            PolynomialSpring({1: law.k1, 3: law.k3}, "rotational spring"),
-            LinearDashpot(law.dashpot, "dashpot"),
-            *law.laws,
+        turning = _named(
+            (PolynomialSpring(k1=law.k1, k3=law.k3), LinearDashpot(law.dashpot), *law.laws)
         )
         fields = disc.connectors
         if fields is None:
-            self._without_crossings(turning, histories)
+            self._without_crossings([label for label, _ in turning], histories)
             return
 
         def number(value: Any) -> Any:
@@ -106,7 +106,7 @@ class Crossings:
             crossover.alignment_term(fields, number(law.alignment)),
         ]
         moments = []
-        for piece in turning:
+        for label, piece in turning:
             memory: dict[str, Function] = {}
 
             def past(name: str, memory: dict[str, Function] = memory) -> Function:
@@ -114,22 +114,19 @@ class Crossings:
 
             at = Crossing(gamma, gamma_n, self.per_time, number, past)
             moment = piece.moment(at)
-            moments.append(moment)
-            energy = loss = None
-            if piece is turning[0]:
-                energy = crossover.rotational_energy(fields, number(law.k1), number(law.k3))
-            else:
-                loss = at.change
+            share = fields.interlacing if piece.interlaced else fields.patch
+            moments.append(share * moment)
+            energy, loss = piece.energy_and_loss(at, moment)
             self.terms.append(
                 crossover.turning_term(
-                    piece.name, fields, moment, gamma, change, energy=energy, loss=loss
+                    label, fields, moment, gamma, change, share=share, energy=energy, loss=loss
                 )
             )
             for name, value in piece.history(at).items():
-                remembered.append((f"{piece.name}: {name}", past(name), value))
+                remembered.append((f"{label}: {name}", past(name), value))
         self._remember(histories, remembered)
         self._angle = self._compiled(gamma)
-        self._moment = self._compiled(fields.interlacing * sum(moments))
+        self._moment = self._compiled(sum(moments))
 
     def _springs(
         self, law: CrossoverLaw, number: Any, remembered: list[tuple[str, Any, Any]]
@@ -145,9 +142,9 @@ class Crossings:
             remembered.append((f"slip {direction} the warp", past, new))
         return springs.term(name)
 
-    def _without_crossings(self, turning: Sequence[ShearLaw], histories: Histories) -> None:
+    def _without_crossings(self, turning: Sequence[str], histories: Histories) -> None:
         """The same collective calls on a rank that has no crossing of its own."""
-        names = ["translation springs", "normal alignment", *(piece.name for piece in turning)]
+        names = ["translation springs", "normal alignment", *turning]
         self.terms = [Term(name, "crossovers", None, None) for name in names]
         self._remember(histories, [])
         self._angle = self._compiled(None)
@@ -188,6 +185,14 @@ class Crossings:
             _dolfinx.add_vector(field.x.array, form)
             own = self.disc.crossing_values(field)
         return self.disc.gather_crossings(own)[:, 0]
+
+
+def _named(laws: Sequence[CrossingLaw]) -> list[tuple[str, CrossingLaw]]:
+    """Laws with the names of their terms and memories, those of a kind counted from the second."""
+    kinds = [law.name for law in laws]
+    counts = [kinds[: i + 1].count(kind) for i, kind in enumerate(kinds)]
+    names = [kind if n == 1 else f"{kind} {n}" for kind, n in zip(kinds, counts, strict=True)]
+    return list(zip(names, laws, strict=True))
 
 
 class Contacts:

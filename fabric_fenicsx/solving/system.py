@@ -31,7 +31,7 @@ class System:
     Args:
         net: the discretised net.
         terms: the model; their sums are compiled here (collective, slow on a first run), the parts
-            of a single term when they are asked for.
+            of a single term when they are asked for. Their names tell them apart.
         law: the section law of the beam term, for the forces that its tangent needs.
 
     Attributes:
@@ -40,6 +40,9 @@ class System:
         assemblies: how many residuals and tangents there were, for benchmarks.
         refresh: called after each new increment, for coefficients that depend on it otherwise than
             through UFL.
+
+    Raises:
+        ValueError: two terms have the same name.
     """
 
     def __init__(
@@ -48,6 +51,11 @@ class System:
         self.net = net
         self.terms = list(terms)
         self._by_name = {term.name: term for term in self.terms}
+        if len(self._by_name) < len(self.terms):
+            names = [term.name for term in self.terms]
+            raise ValueError(
+                f"{next(n for n in names if names.count(n) > 1)}: a term that is twice"
+            )
         self._forms: dict[tuple[str, str], Any] = {}
         # One kernel call and one insertion per cell for all terms of a mesh.
         self._residuals = {mesh: self._sum("residual", mesh) for mesh in MESHES}

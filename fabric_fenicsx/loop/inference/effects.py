@@ -11,44 +11,11 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
+from ...inputs.parameters import Parameter
+
 __all__ = ["Effect", "Parameter", "Values", "Variant", "scaled"]
 
 Values = Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    """A number to be fitted.
-
-    Attributes:
-        name: with its unit at the end, as k1_N.
-        starts: values from which a fit is begun; an amplitude that the model is all but linear in
-            needs none.
-        lower, upper: bounds.
-        amplitude: whether it is the strength of an effect, zero in the baseline.
-        meaning: one line for the report.
-        share_of: "duration", "angle", "rate" or "travel": starts and bounds are shares of the
-            longest run, or of the largest shear angle, rate or displacement in the data; of a
-            cantilever "curvature" or "moment", the largest of them in the fitted baseline.
-        jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
-            for on both sides.
-        run: the run, counted from 0, that it alone belongs to.
-    """
-
-    name: str
-    starts: tuple[float, ...] = ()
-    lower: float = -float("inf")
-    upper: float = float("inf")
-    amplitude: bool = False
-    meaning: str = ""
-    share_of: str = ""
-    jumps: bool = False
-    run: int | None = None
-
-    @property
-    def one_sided(self) -> bool:
-        """An amplitude that cannot be negative."""
-        return self.amplitude and self.lower == 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,8 +5,8 @@ the whole net is that of one crossing times their number. With m per area of fab
 
     D = L (2 cos θ − √2),    θ = π/4 − γ/2,    F = m(γ, γ̇, ...) L_fabric² / (L sin θ)
 
-from the virtual work F dD = m L_fabric² dγ. The laws are those of mechanics.shear_laws, the same
-objects that the whole net takes; how far tows that bend between crossings leave this is tested.
+from the virtual work F dD = m L_fabric² dγ. The laws are those of mechanics.laws, the same
+classes that the whole net takes; how far tows that bend between crossings leave this is tested.
 """
 
 from __future__ import annotations
@@ -21,10 +21,13 @@ import numpy as np
 import numpy.typing as npt
 from ufl import acos, sin
 
+from ....inputs.parameters import Parameter
+from ....mechanics.laws.dashpots import LinearDashpot
+from ....mechanics.laws.law import Crossing
+from ....mechanics.laws.springs import PolynomialSpring
 from ....mechanics.scalars import derivative_of
-from ....mechanics.shear_laws import Crossing, LinearDashpot, PolynomialSpring
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, Parameter, Variant, scaled
+from ...inference.effects import Effect, Variant, scaled
 from ...inference.experiment import Readings
 from ...inference.noise import estimated_noise
 from ...measurement.schema import Measurement
@@ -70,7 +73,7 @@ class PictureFrame:
             "frame": Varying(np.array([[m.rig.frame_length_mm for m, _ in runs]])),
             "fabric": Varying(np.array([[m.rig.fabric_length_mm for m, _ in runs]])),
         }
-        self._compiled: dict[int, Marched] = {}
+        self._compiled: dict[Any, Marched] = {}
         kinematics = self._kinematics(self._travel(None, {}), {})
         gamma, rate = (self._at_readings(kinematics[key].value) for key in ("gamma", "rate"))
         time = self._at_readings(self._points["time"].value)
@@ -182,7 +185,7 @@ class PictureFrame:
         """True displacement of the frame, and its rate."""
         if variant is None or variant.travel is None:
             return {"D": self._points["D"], "D_rate": self._points["D_rate"]}
-        key = id(variant)
+        key = (variant, "travel")
         if key not in self._compiled:
             marched = Marched(("D", "D_rate"), tuple(p.name for p in variant.parameters))
             past = marched.remembered("D") if variant.remembers_travel else None
@@ -194,7 +197,7 @@ class PictureFrame:
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         """γ at each point and at the one before, γ̇, and force per moment."""
-        if 0 not in self._compiled:
+        if "kinematics" not in self._compiled:
             marched = Marched(("D", "D_rate", "frame", "fabric"), ())
             at = marched.at
             theta = acos((sqrt(2.0) + at["D"] / at["frame"]) / 2)
@@ -205,10 +208,10 @@ class PictureFrame:
                 "rate_per_speed": derivative_of(gamma, at["D"]),
                 "factor": at["fabric"] ** 2 / (at["frame"] * sin(theta)),
             }
-            self._compiled[0] = marched.define(outputs, {})
+            self._compiled["kinematics"] = marched.define(outputs, {})
         shape = travel["D"].value.shape
         rig = {name: Varying(np.broadcast_to(v.value, shape)) for name, v in self._rig.items()}
-        known = self._compiled[0]({**travel, **rig}, values)
+        known = self._compiled["kinematics"]({**travel, **rig}, values)
         gamma = known["gamma"]
         before = Varying(_shifted(gamma.value), {p: _shifted(s) for p, s in gamma.slopes.items()})
         return {**known, "gamma_n": before, "per_time": self._points["per_time"]}
@@ -217,7 +220,7 @@ class PictureFrame:
         self, variant: FrameVariant | None, known: dict[str, Varying], values: Mapping[str, float]
     ) -> Varying:
         """Moment per area [N] of the baseline or of an effect."""
-        key = 1 if variant is None else id(variant)
+        key = (variant, "moment")
         if key not in self._compiled:
             parameters = self.baseline if variant is None else variant.parameters
             marched = Marched(
@@ -226,7 +229,7 @@ class PictureFrame:
             at, p = marched.at, marched.at
             if variant is None:
                 laws: tuple[Any, ...] = (
-                    PolynomialSpring({1: p["k1_N"], 3: p["k3_N"]}),
+                    PolynomialSpring(k1=p["k1_N"], k3=p["k3_N"]),
                     LinearDashpot(p["c1_N_s"]),
                 )
             else:
@@ -249,7 +252,7 @@ class PictureFrame:
         return self._compiled[key](known, values)["moment"]
 
     def _reading(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
-        key = id(variant)
+        key = (variant, "reading")
         if key not in self._compiled:
             assert variant.reading is not None
             marched = Marched(("time",), tuple(p.name for p in variant.parameters))
@@ -285,7 +288,7 @@ class PictureFrame:
         assert variant.reading is not None
         names = dict.fromkeys(p.name.split("_", 1)[1] for p in variant.parameters)
         # The form's, not the variant's, which may have parameters of fewer runs.
-        key = id(variant.reading)
+        key = variant.reading
         if key not in self._compiled:
             unit = Marched(("time",), tuple(names))
             added = variant.reading(unit.at, unit.at["time"])

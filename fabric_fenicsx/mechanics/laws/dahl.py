@@ -1,0 +1,35 @@
+"""Dahl friction between warp and weft."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ufl import conditional, exp, ge, max_value, min_value
+
+from .coulomb import LIMIT, SLIP, CoulombFriction
+from .law import Crossing, Form
+
+__all__ = ["DahlFriction"]
+
+
+@dataclass(frozen=True)
+class DahlFriction(CoulombFriction):
+    """Dahl's smooth friction: dM/dγ = k (1 − M sign(γ̇)/m_c), solved exactly over a step.
+
+    With ψ = M²/2k it loses M² |γ̇|/m_c (P. R. Dahl, AIAA J. 14 (1976) 1675-1682). Its numbers are
+    Coulomb's, the stiffness k being that at reversal of a relaxed contact.
+    """
+
+    law = "dahl_friction"
+    name = "Dahl friction"
+    forms = (Form("crossover_friction", "Dahl", ({"limit": LIMIT, "stick_angle": SLIP},), rank=2),)
+
+    def moment(self, at: Crossing) -> Any:
+        """±m_c + (M_n ∓ m_c) exp(−k |Δγ| / m_c)."""
+        limit = at.number(self.limit)
+        step = at.change * at.number(self.stiffness) / limit
+        past = at.past("moment")
+        forth = limit + (past - limit) * exp(-max_value(step, 0))
+        back = -limit + (past + limit) * exp(min_value(step, 0))
+        return conditional(ge(step, 0), forth, back)

@@ -1,0 +1,113 @@
+"""Dashpots in the plane: M is a function of γ̇ alone, and all its work is lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ...inputs.groups import NotNegative
+from ...inputs.parameters import Parameter
+from .law import Crossing, CrossingLaw, Form, asinh, number, per_area
+
+__all__ = ["EyringDashpot", "LinearDashpot", "PowerDashpot"]
+
+
+@dataclass(frozen=True)
+class LinearDashpot(CrossingLaw):
+    """M = β γ̇.
+
+    The dashpot of every crossing, which a case gives as crossover.dashpot_N_s_mm.
+
+    Attributes:
+        beta: β [N mm s].
+    """
+
+    beta: Any = per_area("dashpot_N_s_mm", "β, viscous moment per area and rate", NotNegative)
+
+    law = "linear_dashpot"
+    name = "dashpot"
+
+    def moment(self, at: Crossing) -> Any:
+        """Rate times β."""
+        return at.number(self.beta) * at.rate
+
+
+@dataclass(frozen=True)
+class PowerDashpot(CrossingLaw):
+    """M = c |γ̇|^p sign γ̇, rounded below a rate v: c γ̇ (γ̇² + v²)^((p−1)/2).
+
+    Attributes:
+        c: [N mm s^p].
+        power: p [-]; 1 is the linear dashpot, smaller ones flatten towards friction.
+        floor: v [rad/s], well below those of interest, where the slope stays finite.
+    """
+
+    c: Any = per_area("c_N_mm", "moment per area at a rate of 1 rad/s")
+    power: Any = number("power", "exponent of the rate; 1 is a linear dashpot")
+    floor: float = 1e-5
+
+    law = "power_dashpot"
+    forms = (
+        Form(
+            "rate_hardening",
+            "power law",
+            (
+                {
+                    # Negative, it would feed the fabric with energy at some rate.
+                    "c": Parameter(
+                        "c_n_N_s_n", lower=0.0, amplitude=True, meaning="moment per rate^n"
+                    ),
+                    "power": Parameter(
+                        "n", (0.3, 0.6, 1.5, 2.0), 0.1, 4.0, meaning="power of the rate"
+                    ),
+                    "floor": 1e-7,
+                },
+            ),
+        ),
+    )
+
+    def moment(self, at: Crossing) -> Any:
+        """The rounded power of the rate."""
+        rounded = at.rate**2 + at.number(self.floor) ** 2
+        return at.number(self.c) * at.rate * rounded ** ((at.number(self.power) - 1) / 2)
+
+
+@dataclass(frozen=True)
+class EyringDashpot(CrossingLaw):
+    """M = c asinh(γ̇/v): linear at slow rates, then slower and slower (Eyring's thermal activation).
+
+    Attributes:
+        c: [N mm].
+        rate: v [rad/s], about which it bends over.
+    """
+
+    c: Any = per_area("c_N_mm", "moment per area and factor e of a fast rate")
+    rate: Any = number("rate_rad_s", "v, the rate about which the moment bends over")
+
+    law = "eyring_dashpot"
+    name = "Eyring dashpot"
+    forms = (
+        Form(
+            "rate_hardening",
+            "Eyring",
+            (
+                {
+                    "c": Parameter(
+                        "c_N", lower=0.0, amplitude=True, meaning="moment per e of the rate"
+                    ),
+                    "rate": Parameter(
+                        "rate_rad_s",
+                        (1e-3, 0.03, 0.3),
+                        1e-4,
+                        3.0,
+                        meaning="rate about which the moment bends over",
+                        share_of="rate",
+                    ),
+                },
+            ),
+        ),
+    )
+
+    def moment(self, at: Crossing) -> Any:
+        """Odd in the rate."""
+        return at.number(self.c) * asinh(at.rate / at.number(self.rate))

@@ -1,0 +1,58 @@
+"""Friction between warp and weft that does not stick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ufl import max_value, min_value, tanh
+
+from ...inputs.groups import NotNegative
+from ...inputs.parameters import Parameter
+from .coulomb import LIMIT
+from .law import Crossing, CrossingLaw, Form, number, per_area
+
+__all__ = ["SlidingFriction"]
+
+ROUNDING = Parameter(
+    "rounding_rad_s",
+    (1e-3, 0.1),
+    1e-4,
+    0.3,
+    meaning="rate below which the friction falls off",
+    share_of="rate",
+)
+GROWTH = Parameter("growth_1_rad", (1.0,), 0.0, 50.0, meaning="of m_c, with the angle")
+
+
+@dataclass(frozen=True)
+class SlidingFriction(CrossingLaw):
+    """M = m_c (1 + a |γ|) tanh(γ̇/v): Coulomb friction that does not stick: a hold has none.
+
+    Attributes:
+        limit: m_c [N mm].
+        rounding: v [rad/s], well below the rates of interest.
+        growth: a [1/rad], as shear presses the tows together.
+    """
+
+    limit: Any = per_area("limit_N_mm", "moment per area at no shear")
+    rounding: Any = number(
+        "rounding_rad_s", "v, rate below which the friction falls off", default=1e-5
+    )
+    growth: Any = number("growth_1_rad", "a, growth of the limit with the angle", NotNegative, 0.0)
+
+    law = "sliding_friction"
+    forms = (
+        Form("crossover_friction", "sliding only", ({"limit": LIMIT, "rounding": ROUNDING},)),
+        Form(
+            "crossover_friction",
+            "sliding, growing with the angle",
+            ({"limit": LIMIT, "rounding": ROUNDING, "growth": GROWTH},),
+            rank=3,
+        ),
+    )
+
+    def moment(self, at: Crossing) -> Any:
+        """The rounded sign of the rate, cut off where round-off has made it one."""
+        sign = max_value(min_value(at.rate / at.number(self.rounding), 20), -20)
+        return at.number(self.limit) * (1 + at.number(self.growth) * at.size) * tanh(sign)

@@ -1,0 +1,110 @@
+"""Moments through points, monotone and continuously differentiable.
+
+Between its points a table is F. N. Fritsch and R. E. Carlson's monotone cubic (SIAM J. Numer.
+Anal. 17 (1980) 238-246); beyond the last it goes on with the last slope. It starts at (0, 0) and is
+continued as an odd function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator, PPoly
+from ufl import conditional, lt
+
+from ...inputs.groups import NotNegative
+from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, size_of
+
+__all__ = ["TabulatedDashpot", "TabulatedSpring"]
+
+MOMENTS = "moments per area there, not falling"
+
+
+@dataclass(frozen=True)
+class TabulatedSpring(CrossingLaw):
+    """Elastic moment M(γ) through points, from (0, 0); ψ is the antiderivative of its cubics.
+
+    Attributes:
+        angles: [rad], increasing from 0.
+        moments: [N mm], 0 at first.
+    """
+
+    angles: Any = in_degrees("angles_deg", "shear angles, increasing from 0", list[NotNegative])
+    moments: Any = per_area("moments_N_mm", MOMENTS, list[NotNegative])
+
+    law = "tabulated_spring"
+
+    def __post_init__(self) -> None:
+        _check_table(self.name, self.angles, self.moments)
+
+    def moment(self, at: Crossing) -> Any:
+        """The cubic of the interval that |γ| lies in, with the sign of γ."""
+        cubics = _cubics(self.angles, self.moments)
+        return signed(at.gamma, _evaluated(cubics, at.size, at.number))
+
+    def energy(self, gamma: Any, memory: Mapping[str, Any], number: Callable[[Any], Any]) -> Any:
+        """∫ M dγ from 0 to |γ|."""
+        quartics = _cubics(self.angles, self.moments).antiderivative()
+        return _evaluated(quartics, size_of(gamma), number)
+
+
+@dataclass(frozen=True)
+class TabulatedDashpot(CrossingLaw):
+    """Viscous moment M(γ̇) through points of the rate, from (0, 0).
+
+    The form in which the paper gives its dashpot.
+
+    Attributes:
+        rates: [rad/s], increasing from 0.
+        moments: [N mm], 0 at first.
+    """
+
+    rates: Any = number("rates_rad_s", "rates of shear, increasing from 0", list[NotNegative])
+    moments: Any = per_area("moments_N_mm", MOMENTS, list[NotNegative])
+
+    law = "tabulated_dashpot"
+
+    def __post_init__(self) -> None:
+        _check_table(self.name, self.rates, self.moments)
+
+    def moment(self, at: Crossing) -> Any:
+        """The cubic of the interval that |γ̇| lies in, with the sign of γ̇."""
+        cubics = _cubics(self.rates, self.moments)
+        return signed(at.rate, _evaluated(cubics, size_of(at.rate), at.number))
+
+
+def _check_table(name: str, x: tuple[float, ...], y: tuple[float, ...]) -> None:
+    if len(x) != len(y) or len(x) < 2:
+        raise ValueError(f"{name}: {len(x)} and {len(y)} values; two or more pairs are needed")
+    if x[0] != 0.0 or y[0] != 0.0:
+        raise ValueError(f"{name}: the table starts at ({x[0]}, {y[0]}), not at (0, 0)")
+    if any(b <= a for a, b in pairwise(x)):
+        raise ValueError(f"{name}: the first column must increase")
+    if any(b < a for a, b in pairwise(y)):
+        raise ValueError(f"{name}: the moments must not fall")
+
+
+def _cubics(x: tuple[float, ...], y: tuple[float, ...]) -> PPoly:
+    """The monotone cubics, and a straight piece behind the last point."""
+    cubics = PchipInterpolator(x, y)
+    ending = [0.0, 0.0, float(cubics.derivative()(x[-1])), y[-1]]
+    return PPoly(np.column_stack([cubics.c, ending]), [*x, x[-1] + 1.0])
+
+
+def _evaluated(pieces: PPoly, size: Any, number: Callable[[Any], Any]) -> Any:
+    """Piecewise polynomials at a size that is not negative; the last piece goes on for ever."""
+    order, count = pieces.c.shape
+    knots = number(tuple(pieces.x[:-1]))
+    coefficients = number(tuple(pieces.c.T.ravel()))
+    value: Any = None
+    for i in reversed(range(count)):
+        s = size - knots[i]
+        piece = coefficients[order * i]
+        for j in range(1, order):
+            piece = piece * s + coefficients[order * i + j]
+        value = piece if value is None else conditional(lt(size, knots[i + 1]), piece, value)
+    return value
