@@ -11,7 +11,7 @@ import yaml
 from test_diagnose import command, report_of
 
 from fabric_fenicsx.errors import InputError
-from fabric_fenicsx.loop.inference.effects import read_effects
+from fabric_fenicsx.loop.own_effects import read_effects
 
 DEMOS = Path(__file__).parents[1] / "demos"
 CASE, OWN = DEMOS / "picture_frame.yaml", DEMOS / "own_effects.py"
