@@ -114,8 +114,8 @@ def test_a_high_limit_is_no_limit():
 def test_the_key_of_a_case():
     """Per crossing, like the stiffness of the springs."""
     keys = CrossoverKeys.model_validate({"slip_limit_N": 3.0})
-    assert crossover_law(keys, 12.0, 10.0).slip_limit == 3.0
-    assert crossover_law(CrossoverKeys(), 12.0, 10.0).slip_limit is None
+    assert crossover_law(keys, 120.0).slip_limit == 3.0
+    assert crossover_law(CrossoverKeys(), 120.0).slip_limit is None
 
 
 @pytest.mark.parametrize("crimp", [0.0, 1.3])

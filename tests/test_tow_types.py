@@ -46,7 +46,7 @@ def test_each_tow_carries_what_its_section_does():
         net,
         sections,
         tow_section=kind,
-        crossovers=crossover_law(case.crossover, 12.0, 12.0),
+        crossovers=crossover_law(case.crossover, 144.0),
         supports=[
             Support(left, (0, 1, 2, 3, 4, 5)),
             Support(right, (0, 1, 2, 3, 4, 5), lambda time: time * moved),

@@ -62,21 +62,22 @@ def _run(
 
     case = from_root(comm, lambda: load_case(path, settings))
 
-    from ..output.folder import prepare_folder
-    from ..output.record import write_result
-    from ..rigs.common import Session
-    from ..rigs.registry import rig
-    from ..rigs.write_case import case_text
+    from ..rigs.run import run
     from ..terminal import following, summarise
 
-    prepare_folder(folder, comm)
     root = comm.rank == 0
     with following(quiet=quiet or not root) as progress:
-        session = Session(folder, comm, path.parent, started, progress, resume, pictures)
-        session.case_text = case_text(case, path.parent)
-        result = rig(case.test).run(case, session)
+        result = run(
+            case,
+            folder,
+            base=path.parent,
+            resume=resume,
+            pictures=pictures,
+            progress=progress,
+            started=started,
+            comm=comm,
+        )
     if root:
-        write_result(folder, result)
         if not quiet:
             summarise(result, folder)
         if not result["completed"]:

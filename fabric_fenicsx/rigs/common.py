@@ -21,6 +21,7 @@ from ..fabric.gmsh_io import mesh_net, read_msh
 from ..fabric.net import WARP, WEFT, Net
 from ..fabric.paths import TowPaths
 from ..fabric.section import RectangularSection
+from ..mechanics.laws.law import CrossingLaw
 from ..output.files import write_text
 from ..solving.model import Model
 from ..solving.parts import CrossoverLaw
@@ -55,6 +56,7 @@ class Session:
         resume: go on from the last step in the folder.
         pictures: draw them.
         case_text: the case as it is run, kept beside the records.
+        laws: of the crossings, beside those of the case, from the area of a crossing [mm²].
     """
 
     folder: Path
@@ -65,6 +67,7 @@ class Session:
     resume: bool = False
     pictures: bool = True
     case_text: str | None = None
+    laws: tuple[Callable[[float], CrossingLaw], ...] = ()
 
     @property
     def root(self) -> bool:
@@ -110,16 +113,17 @@ def tow_sections(
     return tuple(sections), kind
 
 
-def crossover_law(keys: CrossoverKeys, warp_spacing: float, weft_spacing: float) -> CrossoverLaw:
-    """Laws per crossing from laws per area: M = m · warp spacing · weft spacing."""
-    area = warp_spacing * weft_spacing
+def crossover_law(
+    keys: CrossoverKeys, area: float, more: Sequence[Callable[[float], CrossingLaw]] = ()
+) -> CrossoverLaw:
+    """Laws per crossing from laws per area: M = m · area of a crossing [mm²]."""
     return CrossoverLaw(
         translation=keys.translation_N_mm,
         k1=keys.k1_N_mm * area,
         k3=keys.k3_N_mm * area,
         dashpot=keys.dashpot_N_s_mm * area,
         alignment=keys.alignment_N_mm,
-        laws=tuple(law.build(area) for law in keys.laws),
+        laws=(*(law.build(area) for law in keys.laws), *(law(area) for law in more)),
         slip_limit=keys.slip_limit_N,
     )
 
@@ -142,7 +146,7 @@ def fabric_model(
         sections,
         tow_section=kind,
         section_law=case.tow.section_law,
-        crossovers=crossover_law(case.crossover, *spacings),
+        crossovers=crossover_law(case.crossover, spacings[0] * spacings[1], session.laws),
         comm=session.comm,
         **rig,
     )
