@@ -132,6 +132,7 @@ def main(
         end=duration,
         control=StepControl(first=0.1, smallest=1e-4, largest=3.0, largest_move=4.0),
         force_tolerance=1e-4,
+        quarter=True,
     )
     if run.last is None:
         raise SystemExit(run.stop)

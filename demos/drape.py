@@ -116,6 +116,7 @@ def main(folder: Path = Path("results/demo_drape"), duration: float = 60.0) -> d
         end=duration,
         control=StepControl(first=0.1, smallest=1e-4, largest=3.0),
         force_tolerance=1e-4,
+        quarter=True,
     )
     if run.last is None:
         raise SystemExit(run.stop)

@@ -51,6 +51,8 @@ class Record:
         model: what is run.
         resume_at: keep the steps up to this time [s]; None starts afresh.
         case_text: what `case.yaml` shall say; None writes none.
+        quarter: whether the model is the part x >= 0, y >= 0 of a symmetric sheet; forces and
+            energies in `steps.csv` are of the whole one.
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class Record:
         *,
         resume_at: float | None = None,
         case_text: str | None = None,
+        quarter: bool = False,
     ) -> None:
         self.folder, self.model = folder, model
         self.rows: list[dict[str, float]] = []
@@ -71,7 +74,7 @@ class Record:
             if case_text is not None:
                 write_text(folder / "case.yaml", case_text)
         past = model.comm.bcast(self.rows[-1] if self.rows else None)
-        self._balance = Balance(model, past)
+        self._balance = Balance(model, past, quarter=quarter)
 
     def _open(self, resume_at: float | None) -> None:
         """Start the series and the table, or cut both at the time to go on from."""

@@ -28,6 +28,7 @@ from ..solving.parts import CrossoverLaw
 from ..solving.snapshot import Snapshot
 from ..solving.stepping import StepControl
 from .cases import Case, CrossoverKeys, SolverKeys, TowKeys
+from .registry import rig
 from .simulation import Run, simulate
 
 __all__ = [
@@ -200,6 +201,7 @@ def simulated(
         resume=session.resume,
         case_text=session.case_text,
         started=session.started,
+        quarter=rig(case.test).quarter(case),
     )
 
 

@@ -314,11 +314,10 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
     if snapshot is not None:
         _write_crossings(session, net, snapshot)
         row = outcome.rows[-1]
-        parts = 4.0 if case.symmetry == "quarter" else 1.0
         quantities = {
             "punch_depth_mm": case.punch_travel_mm * snapshot.time / case.duration_s,
-            "punch_force_N": -row["punch_force_z_N"] * parts,
-            "holder_force_N": -row["holder_force_z_N"] * parts,
+            "punch_force_N": -row["punch_force_z_N"],
+            "holder_force_N": -row["holder_force_z_N"],
             "holder_height_mm": row["holder_height_mm"],
             "largest_shear_angle_deg": row["largest_shear_deg"],
             "lowest_point_mm": lowest(net, snapshot.displacement),

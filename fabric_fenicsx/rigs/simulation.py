@@ -54,6 +54,7 @@ def simulate(
     resume: bool = False,
     case_text: str | None = None,
     started: float | None = None,
+    quarter: bool = False,
 ) -> Run:
     """Run a model to its end, or as far as it goes. Collective.
 
@@ -71,6 +72,8 @@ def simulate(
         resume: go on from the last step file in the folder.
         case_text: the case as YAML, to be kept beside the records.
         started: perf_counter() at the start of the command, for the total seconds.
+        quarter: whether the model is the part x >= 0, y >= 0 of a symmetric sheet; forces and
+            energies of the rows are of the whole one.
 
     Returns:
         The run; ``completed`` is False where the step control gave up.
@@ -89,7 +92,7 @@ def simulate(
         if stepper.state.time >= end * (1.0 - 1e-12):
             raise InputError(f"{folder}: the run is complete, there is nothing to resume")
     resume_at = stepper.state.time if resume else None
-    record = Record(folder, model, resume_at=resume_at, case_text=case_text)
+    record = Record(folder, model, resume_at=resume_at, case_text=case_text, quarter=quarter)
 
     last: list[Snapshot] = []
 
