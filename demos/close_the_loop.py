@@ -22,15 +22,12 @@
 from pathlib import Path
 from typing import Any
 
-from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
-from fabric_fenicsx.loop.report.figures import data_figure, residual_figure
-from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
-from fabric_fenicsx.rigs.load import load_case
+import fabric_fenicsx as ff
 
 CASE = Path(__file__).with_name("picture_frame.yaml")
 SETTINGS = ["hold_s=20", "travel_mm=80"]
 RATES = (35.0, 105.0, 60.0)  # mm/min; the last run is held out
-HIDDEN = Hidden("crossover_friction", "Dahl", {"m_c_N": 0.01, "slip_angle_rad": 0.02})
+HIDDEN = ff.Hidden("crossover_friction", "Dahl", {"m_c_N": 0.01, "slip_angle_rad": 0.02})
 NOISE = 0.05  # N, one sigma of a reading
 
 
@@ -45,13 +42,13 @@ def main(folder: Path = Path("results/demo_close_the_loop")) -> dict[str, Any]:
     """Go round the loop once; returns the report."""
     measured = folder / "measured"
     if not measured.exists():
-        case = load_case(CASE, SETTINGS)
-        write_measurement(measured, synthesise(case, [HIDDEN], NOISE, rates=RATES))
-    found = diagnose([read_measurement(measured)], folder)
+        case = ff.load_case(CASE, SETTINGS)
+        ff.write_measurement(measured, ff.synthesise(case, [HIDDEN], NOISE, rates=RATES))
+    found = ff.diagnose([ff.read_measurement(measured)], folder)
     (diagnosis,) = found.diagnoses
     names = [f"{rate:g} mm/min" for rate in RATES]
-    data_figure(diagnosis, names).savefig(folder / "close_the_loop.png", dpi=150)
-    residual_figure(diagnosis).savefig(folder / "close_the_loop_residuals.png", dpi=150)
+    ff.data_figure(diagnosis, names).savefig(folder / "close_the_loop.png", dpi=150)
+    ff.residual_figure(diagnosis).savefig(folder / "close_the_loop_residuals.png", dpi=150)
     return found.report
 
 

@@ -254,13 +254,13 @@ def test_missing_case_file_makes_no_folder(tmp_path):
 def test_an_error_on_one_rank_ends_all(case, tmp_path):
     code = """
 from mpi4py import MPI
-import fabric_fenicsx.output.record as record
+import fabric_fenicsx.rigs.run as run
 from fabric_fenicsx.__main__ import main
 def broken(folder, comm):
     if comm.rank == 1:
         raise RuntimeError("on one rank")
     comm.barrier()
-record.prepare_folder = broken
+run.prepare_folder = broken
 main()
 """
     process = command("run", case, "--out", tmp_path, code=code, ranks=2, timeout=60)

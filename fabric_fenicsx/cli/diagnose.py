@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from .collective import collective, from_root
+from ..parallel import from_root
+from .collective import collective
 
 __all__ = ["diagnose"]
 

@@ -9,7 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import SolveError
-from .collective import collective, from_root, say
+from ..parallel import from_root
+from .collective import collective, say
 
 __all__ = ["run"]
 

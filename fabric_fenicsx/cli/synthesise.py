@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from .collective import collective, from_root
+from ..parallel import from_root
+from .collective import collective
 
 if TYPE_CHECKING:
     from ..loop.synthesise import Case, Hidden

@@ -23,6 +23,7 @@ from ..fabric.paths import TowPaths
 from ..fabric.section import RectangularSection
 from ..mechanics.laws.law import CrossingLaw
 from ..output.files import write_text
+from ..parallel import from_root
 from ..solving.model import Model
 from ..solving.parts import CrossoverLaw
 from ..solving.snapshot import Snapshot
@@ -36,6 +37,7 @@ __all__ = [
     "control",
     "crossover_law",
     "extend",
+    "mesh",
     "section",
     "simulated",
     "tow_net",
@@ -205,6 +207,20 @@ def simulated(
     )
 
 
+def mesh(fabric: TowPaths, *, comm: MPI.Comm = MPI.COMM_WORLD) -> Net:
+    """The net of tows in the plane, by gmsh; the same on every rank. Collective.
+
+    Args:
+        fabric: its tows, as a Sheet or a TowLayout.
+        comm: communicator.
+
+    Raises:
+        InputError: there is no such net (on every rank).
+    """
+    net: Net = from_root(comm, lambda: mesh_net(fabric))
+    return net
+
+
 def tow_net(case: Case, sheet: TowPaths, session: Session, *, crossing_gap: float = 0.0) -> Net:
     """The net of a case: from its .msh, or from the sheet by gmsh. Collective.
 
@@ -217,22 +233,14 @@ def tow_net(case: Case, sheet: TowPaths, session: Session, *, crossing_gap: floa
     Raises:
         InputError: the mesh cannot be read (on every rank).
     """
-    comm = session.comm
-    net: Net | None = None
-    problem: str | None = None
-    if session.root:
-        try:
-            if case.mesh is not None:
-                net = read_msh(session.base / case.mesh, crossing_gap=crossing_gap)
-            else:
-                net = mesh_net(sheet, crossing_gap=crossing_gap)
-        except InputError as error:
-            problem = str(error)
-    problem = comm.bcast(problem)
-    if problem is not None:
-        raise InputError(problem)
-    whole: Net = comm.bcast(net)
-    return whole
+
+    def load() -> Net:
+        if case.mesh is not None:
+            return read_msh(session.base / case.mesh, crossing_gap=crossing_gap)
+        return mesh_net(sheet, crossing_gap=crossing_gap)
+
+    net: Net = from_root(session.comm, load)
+    return net
 
 
 def write_table(session: Session, name: str, columns: dict[str, npt.NDArray[Any]]) -> None:

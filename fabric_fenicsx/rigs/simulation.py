@@ -10,6 +10,7 @@ from typing import Any
 
 from .. import _dolfinx
 from ..errors import InputError, SolveError
+from ..output.folder import prepare_folder
 from ..output.record import Record, load_state
 from ..solving.model import Model
 from ..solving.snapshot import Snapshot
@@ -43,11 +44,11 @@ def simulate(
     model: Model,
     folder: Path,
     *,
-    test: str,
     end: float,
-    stops: Sequence[float] = (),
     control: StepControl,
-    force_tolerance: float,
+    test: str = "model",
+    stops: Sequence[float] = (),
+    force_tolerance: float = 1e-4,
     iteration_limit: int = 20,
     measure: Callable[[Snapshot], dict[str, float]] = lambda snapshot: {},
     progress: Callable[[float, int, int], None] = lambda time, step, iterations: None,
@@ -60,11 +61,11 @@ def simulate(
 
     Args:
         model: what to run.
-        folder: where records go; it must exist.
-        test: name of the rig.
+        folder: where records go; is made.
         end: final time [s].
-        stops: times that steps must not jump over (where a prescribed motion has a corner) [s].
         control: step lengths.
+        test: name of the rig.
+        stops: times that steps must not jump over (where a prescribed motion has a corner) [s].
         force_tolerance: residual norm at which a step is in balance [N, N mm].
         iteration_limit: Newton iterations after which a step has failed.
         measure: further columns for each step's row, from its snapshot.
@@ -79,8 +80,9 @@ def simulate(
         The run; ``completed`` is False where the step control gave up.
 
     Raises:
-        InputError: there is nothing to resume.
+        InputError: the folder cannot be written, or there is nothing to resume.
     """
+    prepare_folder(folder, model.comm)
     started = perf_counter() if started is None else started
     newton = model.newton(force_tolerance=force_tolerance, limit=iteration_limit)
     stepper = Stepper(model, newton, control)
