@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import reference
 from scipy.linalg import eigh
-from solve import GivenSection, orders, random_rotation, set_loads
+from solve import GivenSection, orders, random_rotation, set_loads, taylor_remainders
 
 from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.solving.generalised_alpha import GeneralisedAlpha
-from fabric_fenicsx.solving.model import Model, Support
+from fabric_fenicsx.solving.model import NEGLIGIBLE_RATE, Model, Support
 from fabric_fenicsx.solving.stepping import StepControl, Stepper
 
 CLAMPED = (0, 1, 2, 3, 4, 5)
@@ -114,6 +114,61 @@ def free_flight(radius, steps, turn, *, consistent=True):
         stepper.state.vdot[:], stepper.state.a[:] = known, known
     march(stepper, steps, 1.0)
     return tip(model, cells) @ turn
+
+
+def spun(masses, *, steps, tolerance=1e-9, spin=(1.0, 0.4, 0.7)):
+    """A rod spun in space: its stepper after some steps of 0.1, and the iterations of each."""
+    cells, spin = 6, np.array(spin)
+    section = GivenSection((80.0, 40.0, 40.0, 12.0, 10.0, 20.0), masses)
+    X = np.linspace(-2.0, 2.0, cells + 1)[:, None] * [1.0, 0.0, 0.0]
+    model = Model(single_tow(X, (0.0, 0.0, 1.0)), section, inertia=GeneralisedAlpha(0.9))
+    velocities = np.column_stack([np.cross(spin, X), np.tile(spin, (cells + 1, 1))])
+    stepper = start(model, velocities, force_tolerance=tolerance)
+    iterations = []
+    for _ in range(steps):
+        outcome = stepper.try_step(0.1)
+        assert outcome.converged, f"t = {stepper.state.time}: {outcome}"
+        iterations.append(outcome.iterations)
+        stepper.advance(0.1)
+    return stepper, iterations
+
+
+THICK, THIN = (1.0, 3.0, 1.0, 2.5), (1.0, 3e-3, 1e-3, 2.5e-3)
+
+
+def test_a_thick_turning_rod_converges_quadratically():
+    # Steps of 0.13 rad. From 1e-3 on the next iteration has 1e-7 and the one after it 1e-11; what
+    # is linear by a tenth takes six more. Without the unsymmetric part it took 5.6 on the mean.
+    coarse, fine = (spun(THICK, steps=10, tolerance=t)[1] for t in (1e-2, 1e-9))
+    assert np.mean(fine) < 3.5
+    assert max(np.subtract(fine, coarse)) <= 2
+
+
+@pytest.mark.parametrize("spin", [(1.0, 0.4, 0.7), (3.0, 2.0, 4.0)])
+def test_the_tangent_in_flight_is_the_derivative_of_the_residual(spin):
+    # In a state with velocities and accelerations that differ from node to node.
+    stepper, _ = spun(THICK, steps=4, spin=spin)
+    model, rng = stepper.model, np.random.default_rng(3)
+    stepper.try_step(0.1)
+    x, d = stepper.newton.x.copy(), model.disc.vector()
+    d.array[:] = rng.normal(size=d.local_size)
+    rates = orders(taylor_remainders(model, x, d, largest=1e-3))
+    assert rates == pytest.approx(2.0, abs=0.02)
+
+
+@pytest.mark.parametrize("masses", [THICK, THIN])
+def test_a_tangent_declared_symmetric_is_so(masses):
+    # To the rate at which what is left out may slow Newton, relative to the diagonal.
+    stepper, _ = spun(masses, steps=3)
+    stepper.try_step(0.1)
+    model = stepper.model
+    A = model.disc.matrix()
+    model.system.tangent(A)
+    dense = A.convert("dense").getDenseArray()
+    size = np.sqrt(np.abs(np.diag(dense)))
+    worst = np.abs((dense - dense.T) / np.outer(size, size)).max()
+    assert model.system.symmetric == (masses is THIN)
+    assert (worst < NEGLIGIBLE_RATE) == (masses is THIN), f"off by {worst:.1e}"
 
 
 def flight_orders(radius, **options):

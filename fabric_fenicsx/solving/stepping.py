@@ -197,6 +197,12 @@ class Stepper:
         self.state.vdot = acceleration[net.local_nodes]
         self.state.a = self.state.vdot.copy()
 
+    def _turn(self, h: float) -> float:
+        """About how far the fastest node turns in a step [rad]."""
+        spin = (self.state.v + h * self.state.vdot)[: self.net.owned, 3:]
+        own = h * float(np.sqrt((spin**2).sum(axis=1).max(initial=0.0)))
+        return float(self.net.comm.allreduce(own, op=MPI.MAX))
+
     def _largest_move(self) -> float:
         """Length of the longest displacement increment of any node [mm]."""
         w = self.net.tows.w.x.array.reshape(-1, 6)[: self.net.owned, :3]
@@ -208,7 +214,7 @@ class Stepper:
         net, state, model = self.net, self.state, self.model
         model.set_time(state.time, state.time + h)
         if self.alpha is not None:
-            model.set_rates(*self.alpha.rates(h))
+            model.set_rates(*self.alpha.rates(h), self._turn(h))
             v_star, a_star, _ = self._known_rates(self.alpha, h)
             net.tows.rate_star.x.array[:] = v_star.ravel()
             net.tows.acceleration_star.x.array[:] = a_star.ravel()
