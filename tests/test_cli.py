@@ -3,10 +3,12 @@
 import csv
 import json
 import os
+import shutil
 import subprocess
 import sys
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fabric_fenicsx import __version__
@@ -123,6 +125,17 @@ def test_run_prints_a_summary(completed):
     for text in ("punch force", "measured", "paper", "this run", "88", "87"):
         assert text in process.stdout
     assert "Traceback" not in process.stderr
+
+
+def test_fibres_need_no_paraview_folder(completed, tmp_path):
+    """Of the step files alone: every angle of the quarter's table, four times."""
+    folder = tmp_path / "kept"
+    shutil.copytree(completed[0], folder, ignore=shutil.ignore_patterns("paraview", "*.csv"))
+    process = command("fibres", folder)
+    assert process.returncode == 0, process.stderr
+    shear = np.sort(pd.read_csv(folder / "fibres.csv")["shear_deg"].abs())
+    angles = pd.read_csv(completed[0] / "crossings.csv")["angle_deg"]
+    np.testing.assert_allclose(shear, np.sort(np.repeat(90.0 - angles, 4)), atol=1e-6)
 
 
 def test_quiet_prints_nothing(case, tmp_path):

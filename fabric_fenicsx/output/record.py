@@ -1,8 +1,8 @@
 """What a run leaves on disk: every accepted step, a table of steps, a ParaView series, a result.
 
 A step file holds the accepted state in the order of the net's nodes, so that a run can go on from
-it on any number of ranks. Files are written beside their place and then moved there: a run that
-dies leaves whole files only.
+it on any number of ranks, and what is seen of it (output.results). Files are written beside their
+place and then moved there: a run that dies leaves whole files only.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ..solving.snapshot import Snapshot
 from ..solving.stepping import Step, Stepper
 from .files import replacing, write_npz, write_text
 from .paraview import TimeSeries
-from .results import read_net, write_setup
+from .results import read_net, seen_arrays, write_setup
 from .surfaces import tool_surface
 
 __all__ = ["Record", "load_state", "write_result"]
@@ -34,7 +34,7 @@ __all__ = ["Record", "load_state", "write_result"]
 PLATE_EXTENT = 1.24
 """How far out die and holder are drawn, over the farthest node of the flat sheet."""
 
-STEP_SCHEMA = "fabric-step/2"
+STEP_SCHEMA = "fabric-step/3"
 
 STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6 * DEPTH}
 """What a step file has for each node, and how many numbers of it."""
@@ -68,6 +68,7 @@ class Record:
         self.rows: list[dict[str, float]] = []
         self.steps = folder / "steps"
         self._root = model.comm.rank == 0
+        self._seen: dict[str, npt.NDArray[np.float64]] = {}
         if self._root:
             self._open(resume_at)
             (folder / "case.yaml").unlink(missing_ok=True)
@@ -109,10 +110,10 @@ class Record:
         row |= self._balance.step(step.time)
         row |= measure(snapshot)
         self.rows.append(row)
+        places = {tool.name: model.tool_place(tool.name) for tool in model.tools}
+        self._seen = seen_arrays(snapshot, places)
         if self._root:
-            self._series.add(
-                snapshot, {tool.name: model.tool_place(tool.name) for tool in model.tools}
-            )
+            self._series.add(snapshot, places)
             with replacing(self.folder / "steps.csv") as path, path.open("w", newline="") as file:
                 writer = csv.DictWriter(file, list(row))
                 writer.writeheader()
@@ -120,7 +121,7 @@ class Record:
         return snapshot
 
     def keep(self, step: Step, stepper: Stepper) -> None:
-        """Write the accepted state."""
+        """Write the accepted state, and what `observe` has seen of it."""
         disc, state, predictor = self.model.disc, stepper.state, stepper.predictor
         n = disc.owned
         arrays = {
@@ -143,6 +144,7 @@ class Record:
                 "next_step": state.next_step,
             }
             arrays = {name: np.asarray(value) for name, value in scalars.items()} | whole
+            arrays |= self._seen
             arrays |= {f"history: {name}": values for name, values in histories.items()}
             path = self.steps / f"step_{step.number:05d}.npz"
             write_npz(path, arrays, compressed=False)

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from ..fabric.net import WEFT, Net
 from ..fabric.paths import TowPaths
-from ..fabric.sheet import Sheet, spaced_sheet
+from ..fabric.sheet import Sheet
 from ..inputs.groups import Positive
 from .cases import PlainWeaveCase
 from .rig import Rig
@@ -48,13 +48,7 @@ class CantileverCase(PlainWeaveCase):
 
 def strip(case: CantileverCase, length: float) -> Sheet:
     """A specimen of this overhang; warp tows across it, as many as fit."""
-    return spaced_sheet(
-        (0.0, length),
-        (0.0, case.width_mm),
-        case.warp_spacing_mm,
-        case.weft_spacing_mm,
-        subdivisions=case.subdivisions,
-    )
+    return case.woven((0.0, length), (0.0, case.width_mm))
 
 
 def fabrics(case: CantileverCase, base: Path) -> dict[str, TowPaths]:
@@ -72,7 +66,7 @@ def build(case: CantileverCase, length: float, session: Session) -> Model:
     return fabric_model(
         case,
         net,
-        (case.warp_spacing_mm, case.weft_spacing_mm),
+        case.spacings,
         session,
         gravity=(0.0, 0.0, -case.gravity_mm_s2),
         load=lambda time: time,

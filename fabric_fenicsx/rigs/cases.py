@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
+from ..fabric.sheet import Sheet, spaced_sheet
 from ..inputs.groups import Keys, NotNegative, Positive
 from .shear_law_keys import ShearLawKeys
 
@@ -166,3 +167,12 @@ class PlainWeaveCase(Case):
     subdivisions: Annotated[int, Field(ge=1, le=64)] = Field(
         2, description="cells of a tow between two crossings"
     )
+
+    @property
+    def spacings(self) -> tuple[float, float]:
+        """Distance between warp and between weft tows [mm]."""
+        return self.warp_spacing_mm, self.weft_spacing_mm
+
+    def woven(self, x_range: tuple[float, float], y_range: tuple[float, float]) -> Sheet:
+        """A sheet with as many tows as fit, warp along y, centred between its edges [mm]."""
+        return spaced_sheet(x_range, y_range, *self.spacings, subdivisions=self.subdivisions)

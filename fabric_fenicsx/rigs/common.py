@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -243,7 +243,9 @@ def tow_net(case: Case, sheet: TowPaths, session: Session, *, crossing_gap: floa
     return net
 
 
-def write_table(session: Session, name: str, columns: dict[str, npt.NDArray[Any]]) -> None:
+def write_table(
+    session: Session, name: str, columns: Mapping[str, Sequence[float] | npt.NDArray[Any]]
+) -> None:
     """Write a CSV into the results, on rank 0."""
     if session.root:
         text = pd.DataFrame(columns).to_csv(index=False, float_format="%.9g")

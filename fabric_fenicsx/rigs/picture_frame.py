@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 
 from ..fabric.net import Net
 from ..fabric.paths import TowPaths
-from ..fabric.sheet import Sheet, spaced_sheet
+from ..fabric.sheet import Sheet
 from ..inputs.groups import NotNegative, Positive
 from .cases import PlainWeaveCase
 from .rig import Rig
@@ -67,9 +67,7 @@ def woven_sheet(case: PictureFrameCase) -> Sheet:
     """Tows over the whole frame, crossing in the square of side L_fabric in its middle."""
     frame, fabric = case.frame_length_mm, case.fabric_length_mm
     middle = ((frame - fabric) / 2.0, (frame + fabric) / 2.0)
-    woven = spaced_sheet(
-        middle, middle, case.warp_spacing_mm, case.weft_spacing_mm, subdivisions=case.subdivisions
-    )
+    woven = case.woven(middle, middle)
     return Sheet(
         (0.0, frame),
         (0.0, frame),
@@ -141,7 +139,7 @@ def build(case: PictureFrameCase, session: Session) -> Model:
     return fabric_model(
         case,
         net,
-        (case.warp_spacing_mm, case.weft_spacing_mm),
+        case.spacings,
         session,
         viscosity=case.tow.relaxation_time_s,
         supports=[frame_ends(net, case)],
@@ -198,9 +196,8 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
         measure=measure,
     )
     rows = outcome.rows
-    names = ("displacement_mm", "force_N", "shear_angle_deg", "normalised_force_N_mm")
-    columns = {"time_s": np.array([row["time_s"] for row in rows])}
-    columns |= {name: np.array([row[name] for row in rows]) for name in names}
+    names = ("time_s", "displacement_mm", "force_N", "shear_angle_deg", "normalised_force_N_mm")
+    columns = {name: np.array([row[name] for row in rows]) for name in names}
     write_table(session, "curve.csv", columns)
     quantities: dict[str, Any] = {}
     if outcome.last is not None:
