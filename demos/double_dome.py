@@ -129,7 +129,9 @@ def main(
             for tool in tools
             if tool.name in colours
         ]
-        ff.draw_net(folder / f"{shape}.png", net, run.last, surfaces=surfaces, mirror=True, radius=1.3)
+        ff.draw_net(
+            folder / f"{shape}.png", net, run.last, surfaces=surfaces, mirror=True, radius=1.3
+        )
     return {
         "punch_mm": punch_path(run.last.time)[2],
         "sheet_mm": float((net.points + run.last.displacement)[:, 2].max()),

@@ -461,8 +461,6 @@ def main(folder: Path = Path("results/paper")) -> dict[str, Any]:
         The page in Markdown; angles, their rms and the largest shear angle [degrees] of each drape
         by spacing, friction and sheet size; and what another C1 changes.
     """
-    comm = MPI.COMM_WORLD
-    prepare_folder(folder, comm)
     work = folder / "run"
     keys = [(s, mu, float(SHEETS[s])) for s in WIDTHS for mu in FRICTIONS] + [(10, 0.0, 280.0)]
     drapes = {key: draped(work, *key) for key in keys}
@@ -474,7 +472,7 @@ def main(folder: Path = Path("results/paper")) -> dict[str, Any]:
     }
     strips = {spacing: hung(work, spacing) for spacing in WIDTHS}
     curves, change = frames(work)
-    if comm.rank == 0:
+    if MPI.COMM_WORLD.rank == 0:
         draw_drapes(folder / "paper_drape.png", drapes)
         draw_strips(folder / "paper_cantilever.png", strips)
         draw_curves(folder / "paper_picture_frame.png", curves)

@@ -54,12 +54,13 @@ def main(folder: Path = Path("results/weave_drape"), duration: float = 60.0) -> 
             raise SystemExit(f"{name}: {result['stopped_because']}")
         shear = 90.0 - pd.read_csv(own / "crossings.csv")["angle_deg"]
         quantities = result["quantities"]
+        steps = pd.read_csv(own / "steps.csv")
         numbers[name] = {
             "mean_float": ff.WEAVES[name].float_length[0],
             "largest_shear_deg": quantities["largest_shear_angle_deg"],
             "mean_shear_deg": float(shear.mean()),
             "punch_force_N": quantities["punch_force_N"],
-            "shear_energy_N_mm": pd.read_csv(own / "steps.csv")["energy_rotational_spring_N_mm"].iloc[-1],
+            "shear_energy_N_mm": steps["energy_rotational_spring_N_mm"].iloc[-1],
         }
         if MPI.COMM_WORLD.rank == 0:
             results = ff.read_results(own)

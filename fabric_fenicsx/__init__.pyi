@@ -29,6 +29,7 @@ from .loop.diagnose import diagnose as diagnose
 from .loop.diagnose import read_measurement as read_measurement
 from .loop.inference.effects import Effect as Effect
 from .loop.kinds.cantilever.variant import StripVariant as StripVariant
+from .loop.kinds.drape.model import Drape as Drape
 from .loop.kinds.drape.variant import DrapeVariant as DrapeVariant
 from .loop.kinds.picture_frame.variant import FrameVariant as FrameVariant
 from .loop.report.figures import data_figure as data_figure

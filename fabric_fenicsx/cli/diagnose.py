@@ -30,9 +30,7 @@ def diagnose(
     ] = None,
     effects_from: Annotated[
         Path | None,
-        typer.Option(
-            "--effects-from", metavar="FILE.py", help="Effects of your own: a list EFFECTS. Is run."
-        ),
+        typer.Option("--effects-from", metavar="FILE.py", help="Your own laws or EFFECTS. Is run."),
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False,
 ) -> None:

@@ -45,9 +45,7 @@ def synthesise(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the noise.")] = 0,
     effects_from: Annotated[
         Path | None,
-        typer.Option(
-            "--effects-from", metavar="FILE.py", help="Effects of your own: a list EFFECTS. Is run."
-        ),
+        typer.Option("--effects-from", metavar="FILE.py", help="Your own laws or EFFECTS. Is run."),
     ] = None,
     out: Annotated[
         Path | None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from mpi4py import MPI
@@ -72,6 +73,7 @@ def diagnose(
     *,
     effects: Sequence[str] | None = None,
     effects_from: Path | None = None,
+    models: Mapping[str, Callable[..., Experiment]] = MappingProxyType({}),
     progress: Callable[[float, str], None] = lambda done, what: None,
 ) -> Found:
     """Fit the model to measurements of one fabric, trace what is left, and report.
@@ -81,6 +83,7 @@ def diagnose(
         out: folder for report.json, report.html and its figures; None writes nothing.
         effects: names of those to try; by default all that are known.
         effects_from: a Python file with effects of the user's own.
+        models: by test, to be taken instead of that kind's own; see Kind.experiment.
         progress: told the share that is done and what is being done.
 
     Raises:
@@ -88,7 +91,7 @@ def diagnose(
         FitError: a baseline could not be fitted.
     """
     own = read_effects(effects_from) if effects_from is not None else []
-    tests = _experiments(measurements, own)
+    tests = _experiments(measurements, own, models)
     _check_names(effects, tests)
     for kind, _, experiment in tests:
         if not kind.needs_others:
@@ -116,7 +119,11 @@ def diagnose(
     return Found(report, tuple(diagnosis for diagnosis, _ in parts))
 
 
-def _experiments(measurements: Sequence[Measurement], own: Sequence[Effect]) -> list[Test]:
+def _experiments(
+    measurements: Sequence[Measurement],
+    own: Sequence[Effect],
+    models: Mapping[str, Callable[..., Experiment]],
+) -> list[Test]:
     """The tests in the order of the kinds, each with its experiment."""
     tests: list[Test] = []
     for kind in KINDS:
@@ -124,7 +131,8 @@ def _experiments(measurements: Sequence[Measurement], own: Sequence[Effect]) -> 
         if same:
             mine = [effect for effect in own if effect.test == kind.name]
             try:
-                tests.append((kind, same, kind.experiment(same, mine)))
+                model = models.get(kind.name, kind.experiment)
+                tests.append((kind, same, model(same, mine)))
             except SolveError as error:
                 raise _unfitted(kind, error) from error
     for _, _, experiment in tests:

@@ -14,6 +14,8 @@ from pydantic import BaseModel, Field, model_validator
 
 from ..fabric.sheet import Sheet, spaced_sheet
 from ..inputs.groups import Keys, NotNegative, Positive
+from ..mechanics.laws.dashpots import LinearDashpot
+from ..mechanics.laws.springs import PolynomialSpring
 from .shear_law_keys import ShearLawKeys
 
 __all__ = [
@@ -78,13 +80,17 @@ class TowTypeKeys(Keys):
         return tow.model_copy(update=given)
 
 
+SPRING, DASHPOT = PolynomialSpring.numbers(), LinearDashpot.numbers()
+"""What every crossing has."""
+
+
 class CrossoverKeys(Keys):
     """What joins warp and weft; shear law m = k1 γ + k3 γ³ + β γ̇ per area of fabric."""
 
     translation_N_mm: Positive = Field(100.0, description="k of the three translational springs")
-    k1_N_mm: NotNegative = Field(0.02, description="linear part of the shear moment per area")
-    k3_N_mm: NotNegative = Field(0.08, description="cubic part of the shear moment per area")
-    dashpot_N_s_mm: NotNegative = Field(2.0, description="β, viscous moment per area and rate")
+    k1_N_mm: NotNegative = Field(0.02, description=SPRING["k1"].meaning)
+    k3_N_mm: NotNegative = Field(0.08, description=SPRING["k3"].meaning)
+    dashpot_N_s_mm: NotNegative = Field(2.0, description=DASHPOT["beta"].meaning)
     alignment_N_mm: Positive = Field(
         1000.0, description="moment per crossing that keeps the sheet normals of the tows aligned"
     )

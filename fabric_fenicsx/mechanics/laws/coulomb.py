@@ -11,12 +11,18 @@ from ufl import max_value, min_value
 from ...inputs.parameters import Parameter
 from .law import Crossing, CrossingLaw, Form, in_degrees, per_area
 
-__all__ = ["LIMIT", "SLIP", "CoulombFriction"]
+__all__ = ["LIMIT", "CoulombFriction", "friction_numbers"]
 
 LIMIT = Parameter("m_c_N", lower=0.0, amplitude=True, meaning="friction moment per area")
-SLIP = Parameter(
-    "slip_angle_rad", (0.003, 0.015, 0.05), 1e-4, 0.3, meaning="shear until the friction slides"
-)
+
+
+def friction_numbers(
+    index: str = "", starts: tuple[float, ...] = (0.003, 0.015, 0.05)
+) -> dict[str, Any]:
+    """What is fitted of a friction with a stick; an index tells several of them apart."""
+    about = "shear until the friction slides"
+    stick_angle = Parameter(f"slip_angle{index}_rad", starts, 1e-4, 0.3, meaning=about)
+    return {"limit": replace(LIMIT, name=f"m_c{index}_N"), "stick_angle": stick_angle}
 
 
 @dataclass(frozen=True)
@@ -36,25 +42,11 @@ class CoulombFriction(CrossingLaw):
     law = "coulomb_friction"
     name = "Coulomb friction"
     forms: ClassVar[tuple[Form, ...]] = (
-        Form(
-            "crossover_friction",
-            "Coulomb with stick",
-            ({"limit": LIMIT, "stick_angle": SLIP},),
-            rank=1,
-        ),
+        Form("crossover_friction", "Coulomb with stick", (friction_numbers(),), rank=1),
         Form(
             "crossover_friction",
             "two sliders",
-            (
-                {
-                    "limit": replace(LIMIT, name="m_c1_N"),
-                    "stick_angle": replace(SLIP, name="slip_angle1_rad", starts=(0.003, 0.015)),
-                },
-                {
-                    "limit": replace(LIMIT, name="m_c2_N"),
-                    "stick_angle": replace(SLIP, name="slip_angle2_rad", starts=(0.05, 0.15)),
-                },
-            ),
+            (friction_numbers("1", (0.003, 0.015)), friction_numbers("2", (0.05, 0.15))),
             rank=4,
         ),
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 from ufl import conditional, exp, ge, max_value, min_value
 
-from .coulomb import LIMIT, SLIP, CoulombFriction
+from .coulomb import CoulombFriction, friction_numbers
 from .law import Crossing, Form
 
 __all__ = ["DahlFriction"]
@@ -23,7 +23,7 @@ class DahlFriction(CoulombFriction):
 
     law = "dahl_friction"
     name = "Dahl friction"
-    forms = (Form("crossover_friction", "Dahl", ({"limit": LIMIT, "stick_angle": SLIP},), rank=2),)
+    forms = (Form("crossover_friction", "Dahl", (friction_numbers(),), rank=2),)
 
     def moment(self, at: Crossing) -> Any:
         """±m_c + (M_n ∓ m_c) exp(−k |Δγ| / m_c)."""

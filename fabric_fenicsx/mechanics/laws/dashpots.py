@@ -12,6 +12,14 @@ from .law import Crossing, CrossingLaw, Form, asinh, number, per_area
 __all__ = ["EyringDashpot", "LinearDashpot", "PowerDashpot"]
 
 
+# Negative, it would feed the fabric with energy at some rate.
+C_N = Parameter("c_n_N_s_n", lower=0.0, amplitude=True, meaning="moment per rate^n")
+N = Parameter("n", (0.3, 0.6, 1.5, 2.0), 0.1, 4.0, meaning="power of the rate")
+C = Parameter("c_N", lower=0.0, amplitude=True, meaning="moment per e of the rate")
+ABOUT = "rate about which the moment bends over"
+RATE = Parameter("rate_rad_s", (1e-3, 0.03, 0.3), 1e-4, 3.0, meaning=ABOUT, share_of="rate")
+
+
 @dataclass(frozen=True)
 class LinearDashpot(CrossingLaw):
     """M = β γ̇.
@@ -47,24 +55,7 @@ class PowerDashpot(CrossingLaw):
     floor: float = 1e-5
 
     law = "power_dashpot"
-    forms = (
-        Form(
-            "rate_hardening",
-            "power law",
-            (
-                {
-                    # Negative, it would feed the fabric with energy at some rate.
-                    "c": Parameter(
-                        "c_n_N_s_n", lower=0.0, amplitude=True, meaning="moment per rate^n"
-                    ),
-                    "power": Parameter(
-                        "n", (0.3, 0.6, 1.5, 2.0), 0.1, 4.0, meaning="power of the rate"
-                    ),
-                    "floor": 1e-7,
-                },
-            ),
-        ),
-    )
+    forms = (Form("rate_hardening", "power law", ({"c": C_N, "power": N, "floor": 1e-7},)),)
 
     def moment(self, at: Crossing) -> Any:
         """The rounded power of the rate."""
@@ -86,27 +77,7 @@ class EyringDashpot(CrossingLaw):
 
     law = "eyring_dashpot"
     name = "Eyring dashpot"
-    forms = (
-        Form(
-            "rate_hardening",
-            "Eyring",
-            (
-                {
-                    "c": Parameter(
-                        "c_N", lower=0.0, amplitude=True, meaning="moment per e of the rate"
-                    ),
-                    "rate": Parameter(
-                        "rate_rad_s",
-                        (1e-3, 0.03, 0.3),
-                        1e-4,
-                        3.0,
-                        meaning="rate about which the moment bends over",
-                        share_of="rate",
-                    ),
-                },
-            ),
-        ),
-    )
+    forms = (Form("rate_hardening", "Eyring", ({"c": C, "rate": RATE},)),)
 
     def moment(self, at: Crossing) -> Any:
         """Odd in the rate."""

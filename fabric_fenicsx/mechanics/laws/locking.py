@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -25,10 +25,17 @@ ANGLE = Parameter(
 )
 
 
+STIFFNESS = Parameter("k_lock_N", lower=0.0, amplitude=True, meaning="stiffness beyond locking")
+SETS_IN = "angle over which locking sets in"
+WIDTH = Parameter("locking_width_rad", (0.03,), 0.003, 0.06, meaning=SETS_IN)
+MOMENT = Parameter("m_lock_N", lower=0.0, amplitude=True, meaning="moment of locking")
+GROWS = "angle in which it grows by e"
+SCALE = Parameter("locking_scale_rad", (0.05, 0.15), 0.02, 1.0, meaning=GROWS)
+
+
 def _power(power: int) -> Form:
     meaning = f"moment per angle^{power} beyond locking"
-    k = Parameter("k_lock_N", lower=0.0, amplitude=True, meaning=meaning)
-    numbers = {"stiffness": k, "angle": ANGLE, "power": power}
+    numbers = {"stiffness": replace(STIFFNESS, meaning=meaning), "angle": ANGLE, "power": power}
     return Form("shear_locking", f"power {power}", (numbers,))
 
 
@@ -82,23 +89,7 @@ class SmoothLocking(CrossingLaw):
     interlaced = False
     forms = (
         Form(
-            "shear_locking",
-            "smooth",
-            (
-                {
-                    "stiffness": Parameter(
-                        "k_lock_N", lower=0.0, amplitude=True, meaning="stiffness beyond locking"
-                    ),
-                    "angle": ANGLE,
-                    "width": Parameter(
-                        "locking_width_rad",
-                        (0.03,),
-                        0.003,
-                        0.06,
-                        meaning="angle over which locking sets in",
-                    ),
-                },
-            ),
+            "shear_locking", "smooth", ({"stiffness": STIFFNESS, "angle": ANGLE, "width": WIDTH},)
         ),
     )
 
@@ -148,21 +139,7 @@ class ExponentialLocking(CrossingLaw):
         Form(
             "shear_locking",
             "exponential",
-            (
-                {
-                    "moment_scale": Parameter(
-                        "m_lock_N", lower=0.0, amplitude=True, meaning="moment of locking"
-                    ),
-                    "angle": ANGLE,
-                    "scale": Parameter(
-                        "locking_scale_rad",
-                        (0.05, 0.15),
-                        0.02,
-                        1.0,
-                        meaning="angle in which it grows by e",
-                    ),
-                },
-            ),
+            ({"moment_scale": MOMENT, "angle": ANGLE, "scale": SCALE},),
         ),
     )
 

@@ -15,18 +15,13 @@ from .law import Crossing, CrossingLaw, Form, asinh, number, per_area
 __all__ = ["Maxwell"]
 
 
+CUBIC = Parameter("cubic_1_rad2", (1.0, 3.0), 0.0, 50.0, meaning="of its spring")
+
+
 def _branch(index: str, starts: tuple[float, ...]) -> dict[str, Any]:
-    k = Parameter(
-        f"k_maxwell{index}_N", lower=0.0, amplitude=True, meaning="stiffness of the branch"
-    )
-    tau = Parameter(
-        f"relaxation_time{index}_s",
-        starts,
-        1e-3,
-        10.0,
-        meaning="its relaxation time",
-        share_of="duration",
-    )
+    about, name = "stiffness of the branch", f"relaxation_time{index}_s"
+    k = Parameter(f"k_maxwell{index}_N", lower=0.0, amplitude=True, meaning=about)
+    tau = Parameter(name, starts, 1e-3, 10.0, meaning="its relaxation time", share_of="duration")
     return {"stiffness": k, "relaxation_time": tau}
 
 
@@ -60,14 +55,7 @@ class Maxwell(CrossingLaw):
         Form(
             "crossover_relaxation",
             "one branch, cubic",
-            (
-                {
-                    **_branch("", (0.01, 0.03, 0.1, 0.3)),
-                    "cubic": Parameter(
-                        "cubic_1_rad2", (1.0, 3.0), 0.0, 50.0, meaning="of its spring"
-                    ),
-                },
-            ),
+            (_branch("", (0.01, 0.03, 0.1, 0.3)) | {"cubic": CUBIC},),
         ),
         Form(
             "crossover_relaxation",

@@ -51,7 +51,9 @@ def law_effects(
             found.setdefault(form.effect, []).append((law, form))
     effects = []
     for name, forms in found.items():
-        meaning = meanings.get(name) or next((form.meaning for _, form in forms), "")
+        meaning = meanings.get(name) or next(
+            (form.meaning for _, form in forms if form.meaning), ""
+        )
         variants = [
             FrameVariant(form.label, form.parameters, laws=partial(form.laws, law))
             for law, form in sorted(forms, key=lambda pair: pair[1].rank)
