@@ -45,13 +45,13 @@ class Found:
     diagnoses: tuple[Diagnosis, ...]
 
 
-def read_measurement(folder: Path) -> Measurement:
+def read_measurement(folder: Path | str) -> Measurement:
     """Read and check a folder of measured data.
 
     Raises:
         InputError: one line with the file, the key or column, and what is allowed.
     """
-    return read_folder(folder, KINDS)
+    return read_folder(Path(folder), KINDS)
 
 
 def read_measurements(folders: Sequence[Path]) -> list[Measurement]:
@@ -69,7 +69,7 @@ def read_measurements(folders: Sequence[Path]) -> list[Measurement]:
 
 def diagnose(
     measurements: Sequence[Measurement],
-    out: Path | None = None,
+    out: Path | str | None = None,
     *,
     effects: Sequence[str] | None = None,
     effects_from: Path | None = None,
@@ -96,8 +96,9 @@ def diagnose(
     for kind, _, experiment in tests:
         if not kind.needs_others:
             _try_out(experiment, own)
-    if out is not None:
-        prepare_folder(out, MPI.COMM_SELF)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        prepare_folder(folder, MPI.COMM_SELF)
     parts: list[tuple[Diagnosis, dict[str, Any]]] = []
     for number, (kind, same, experiment) in enumerate(tests):
 
@@ -113,9 +114,9 @@ def diagnose(
             raise _unfitted(kind, error) from error
         parts.append((diagnosis, test_report(diagnosis, same)))
     report = combined_report([content for _, content in parts])
-    if out is not None:
+    if folder is not None:
         progress(1.0, "drawing")
-        write_report(out, parts, report)
+        write_report(folder, parts, report)
     return Found(report, tuple(diagnosis for diagnosis, _ in parts))
 
 

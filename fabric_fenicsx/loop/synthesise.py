@@ -160,7 +160,7 @@ def synthesise(
     return Synthetic(content, tables, put_in)
 
 
-def write_measurement(folder: Path, synthetic: Synthetic) -> None:
+def write_measurement(folder: Path | str, synthetic: Synthetic) -> None:
     """Write the folder that a diagnosis reads.
 
     Raises:
@@ -169,7 +169,7 @@ def write_measurement(folder: Path, synthetic: Synthetic) -> None:
     """
     content = synthetic.content
     (noise,) = content["noise"].values()
-    write_folder(folder, kind_of(content["test"]), content, noise, synthetic.tables)
+    write_folder(Path(folder), kind_of(content["test"]), content, noise, synthetic.tables)
 
 
 def _named(effects: Sequence[Effect], name: str, place: str) -> Effect:

@@ -152,12 +152,13 @@ def read_net(path: Path) -> Net:
         raise InputError(f"{path}: not the net of a run ({line})") from None
 
 
-def read_results(folder: Path) -> Results:
+def read_results(folder: Path | str) -> Results:
     """Open the folder of a run.
 
     Raises:
         InputError: it is none, or it has no accepted step.
     """
+    folder = Path(folder)
     parts = sorted(path.parent for path in folder.glob("*/net.npz"))
     if not (folder / "net.npz").exists() and parts:
         names = " or ".join(str(part) for part in parts)
