@@ -37,12 +37,12 @@ __all__ = ["Record", "load_state", "prepare_folder", "write_result"]
 PLATE_EXTENT = 1.24
 """How far out die and holder are drawn, over the farthest node of the flat sheet."""
 
-STEP_SCHEMA = "fabric-step/2"
+STEP_SCHEMA = "fabric-step/3"
 
 STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6 * DEPTH}
 """What a step file has for each node, and how many numbers of it."""
 
-NUMBERS = ("time", "number", "previous_steps", "predictor_order", "next_step")
+NUMBERS = ("time", "number", "previous_steps", "predictor_order", "last_step", "next_step")
 """What it has beside."""
 
 _CLAIMED: dict[Path, int] = {}
@@ -186,6 +186,7 @@ class Record:
                 "number": step.number,
                 "previous_steps": predictor.lengths,
                 "predictor_order": predictor.order,
+                "last_step": state.last_step,
                 "next_step": state.next_step,
             }
             arrays = {name: np.asarray(value) for name, value in scalars.items()} | whole
@@ -241,6 +242,7 @@ def load_state(path: Path, stepper: Stepper) -> None:
     stepper.predictor.lengths = data["previous_steps"]
     stepper.predictor.order = int(data["predictor_order"])
     state.time = float(data["time"])
+    state.last_step = float(data["last_step"])
     state.next_step = float(data["next_step"])
     stepper.number = int(data["number"])
     prefix = "history: "
