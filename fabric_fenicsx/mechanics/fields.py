@@ -77,7 +77,8 @@ class TowFields(Fields):
             (EA, κGA, κGA, GJ, E I_out, E I_in) [N, N mm²].
         mass: mass [tonne/mm] and rotary inertia about the three directors [tonne mm].
         section_forces: (N, M) [N, N mm] that the tangent's geometric part uses.
-        strain_n: (Γ, K) [-, 1/mm] at the start of the step.
+        strain_n, strain_before: (Γ, K) [-, 1/mm] at the start of the step and of the one before.
+        strain_star: what the rate of strain counts from, so that it is c (e − e*).
         rate_star, acceleration_star: the parts of velocity and acceleration known before the
             step, so that v = c_1 w + v*, a = c_0 w + a*.
     """
@@ -87,6 +88,8 @@ class TowFields(Fields):
     mass: Any
     section_forces: Any
     strain_n: Any
+    strain_before: Any
+    strain_star: Any
     rate_star: Any
     acceleration_star: Any
 

@@ -39,7 +39,7 @@ STEP_SCHEMA = "fabric-step/3"
 STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6 * DEPTH}
 """What a step file has for each node, and how many numbers of it."""
 
-NUMBERS = ("time", "number", "previous_steps", "predictor_order", "next_step")
+NUMBERS = ("time", "number", "previous_steps", "predictor_order", "last_step", "next_step")
 """What it has beside."""
 
 
@@ -141,6 +141,7 @@ class Record:
                 "number": step.number,
                 "previous_steps": predictor.lengths,
                 "predictor_order": predictor.order,
+                "last_step": state.last_step,
                 "next_step": state.next_step,
             }
             arrays = {name: np.asarray(value) for name, value in scalars.items()} | whole
@@ -197,6 +198,7 @@ def load_state(path: Path, stepper: Stepper) -> None:
     stepper.predictor.lengths = data["previous_steps"]
     stepper.predictor.order = int(data["predictor_order"])
     state.time = float(data["time"])
+    state.last_step = float(data["last_step"])
     state.next_step = float(data["next_step"])
     stepper.number = int(data["number"])
     prefix = "history: "

@@ -98,6 +98,8 @@ class Discretisation:
             mass=self.cell_field(cells[4], mass),
             section_forces=Function(cells[6]),
             strain_n=Function(cells[6]),
+            strain_before=Function(cells[6]),
+            strain_star=Function(cells[6]),
             rate_star=Function(space),
             acceleration_star=Function(space),
         )

@@ -21,7 +21,7 @@ from ..mechanics.section_laws import with_viscosity
 from ..mechanics.terms import Term, work_term
 from ..mechanics.tools import Tool
 from .discretisation import BLOCK, Discretisation
-from .generalised_alpha import GeneralisedAlpha
+from .generalised_alpha import GeneralisedAlpha, backward_difference
 from .history import Histories
 from .newton import Newton
 from .parts import ContactLaw, Contacts, Crossings, CrossoverLaw
@@ -125,6 +125,8 @@ class Model:
         self._constants(mass_scale)
         self.histories = Histories(self.disc)
         self.histories.add("strain", "cells", self.fields.strain_n, beam.strain(self.fields))
+        before = self.fields.strain_before
+        self.histories.add("strain before", "cells", before, self.fields.strain_n)
 
         terms = self._tow_terms()
         self.crossings: Crossings | None = None
@@ -223,11 +225,22 @@ class Model:
             values[part] = wanted - u[self._place[support.nodes[own]], component]
         return values
 
-    def set_time(self, start: float, end: float) -> None:
-        """Move the tools to their places at the end of the step and set what depends on Δt."""
+    def set_time(self, start: float, end: float, last: float = 0.0) -> None:
+        """Move the tools to their places at the end of the step and set what depends on Δt.
+
+        Args:
+            start: of the step [s].
+            end: of the step [s].
+            last: length of the step before [s]; 0 where strain rates are to be backward differences
+                over this step alone.
+        """
         self.time = start
         self.set_load(end)
-        self.relaxation.value = self.viscosity / (end - start)
+        fields, ratio = self.fields, (end - start) / last if last else 0.0
+        factor, extrapolated = backward_difference(ratio)
+        self.relaxation.value = factor * self.viscosity / (end - start)
+        now, before = (field.x.array for field in (fields.strain_n, fields.strain_before))
+        fields.strain_star.x.array[:] = now + extrapolated * (now - before)
         if self.crossings is not None:
             self.crossings.set_step(end - start)
         if self.contacts is not None:
