@@ -270,3 +270,12 @@ heavy = {"dolfinx", "petsc4py", "mpi4py", "pyvista", "gmsh", "matplotlib"} & set
 assert not heavy, heavy
 """
     subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=True, timeout=60)
+
+
+def test_a_sheet_is_checked_with_its_own_weave(tmp_path):
+    """Its spacings, whatever those of the sheet, and its outline; the file of a pattern is not read."""
+    sheet = "test: drape\nsymmetry: none\nsheet: {width_mm: 20, length_mm: 20}\n"
+    small = "weave: {pattern: nothing.txt, warp_spacings_mm: [4], weft_spacings_mm: [4]}\n"
+    assert load_case(written(tmp_path, sheet + small)).weave is not None
+    said = message(written(tmp_path, sheet + small.replace("[4]", "[24]")))
+    assert "warp spacing is [24.0] mm; the outline is 20 mm wide" in said
