@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fabric_fenicsx.errors import InputError
-from fabric_fenicsx.inputs.keys import documented, plain
+from fabric_fenicsx.inputs.keys import documented, one_of, plain
 from fabric_fenicsx.rigs.cantilever import CantileverCase
 from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
@@ -131,7 +131,7 @@ def test_several_mistakes_are_counted(tmp_path):
     [
         ("", "empty, allowed is a mapping of keys"),
         ("- 1\n", "[1], allowed is a mapping of keys"),
-        ("sheet: {}\n", "test: missing, allowed is drape, picture_frame or cantilever"),
+        ("sheet: {}\n", f"test: missing, allowed is {one_of(RIGS)}"),
         ("test: drap\n", "test: 'drap', did you mean drape?"),
         ("test: [drape]\n", "test: ['drape'], allowed is drape"),
         ("test: drape\nsheet: {width_mm: 3\n", "line 3, column 1: "),
@@ -250,11 +250,11 @@ def test_shear_laws_become_laws_of_a_crossing(tmp_path):
 def test_a_rig_is_called_like_its_file_and_an_unknown_one_is_told_the_names():
     for name in RIGS:
         assert get_args(rig(name).case.model_fields["test"].annotation) == (name,)
-    with pytest.raises(InputError, match="test: nothing, allowed is drape, picture_frame or can"):
+    with pytest.raises(InputError, match=f"^test: nothing, allowed is {one_of(RIGS)}$"):
         rig("nothing")
 
 
-def test_a_case_is_read_and_laid_out_without_dolfinx():
+def test_a_case_is_read_and_laid_out_without_dolfinx(tmp_path):
     """Reading must not wait for what only a run needs."""
     code = """
 import sys
@@ -262,9 +262,20 @@ from pathlib import Path
 from fabric_fenicsx.rigs.load import load_case
 from fabric_fenicsx.rigs.registry import RIGS, rig
 for name in RIGS:
-    case = load_case(Path(sys.argv[1]) / f"{name}.yaml")
+    path = Path(sys.argv[1]) / "case.yaml"
+    path.write_text(f"test: {name}")
+    case = load_case(path)
     assert rig(name).fabrics(case, Path())
 heavy = {"dolfinx", "petsc4py", "mpi4py", "pyvista", "gmsh", "matplotlib"} & set(sys.modules)
 assert not heavy, heavy
 """
-    subprocess.run([sys.executable, "-c", code, str(DEMOS)], check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=True, timeout=60)
+
+
+def test_a_sheet_is_checked_with_its_own_weave(tmp_path):
+    """Its spacings, whatever those of the sheet, and its outline; the file of a pattern is not read."""
+    sheet = "test: drape\nsymmetry: none\nsheet: {width_mm: 20, length_mm: 20}\n"
+    small = "weave: {pattern: nothing.txt, warp_spacings_mm: [4], weft_spacings_mm: [4]}\n"
+    assert load_case(written(tmp_path, sheet + small)).weave is not None
+    said = message(written(tmp_path, sheet + small.replace("[4]", "[24]")))
+    assert "warp spacing is [24.0] mm; the outline is 20 mm wide" in said
