@@ -15,7 +15,6 @@
 
 # %%
 from pathlib import Path
-from time import perf_counter
 
 from mpi4py import MPI
 
@@ -23,11 +22,7 @@ import numpy as np
 import pandas as pd
 from scipy.integrate import solve_bvp, trapezoid
 
-from fabric_fenicsx.output.record import prepare_folder
-from fabric_fenicsx.rigs import cantilever
-from fabric_fenicsx.rigs.cases import CantileverCase
-from fabric_fenicsx.rigs.common import Session, section
-from fabric_fenicsx.rigs.fabrics import strip
+import fabric_fenicsx as ff
 
 
 # %%
@@ -55,19 +50,23 @@ def elastica_drop(length: float, weight: float, stiffness: float) -> float:
 # %%
 def main(folder: Path = Path("results/demo_cantilever")) -> dict[float, tuple[float, float]]:
     """Run the three specimens; returns the tip's drop [mm] by the net and by the elastica."""
-    comm = MPI.COMM_WORLD
-    case = CantileverCase.model_validate(
-        {"test": "cantilever", "solver": {"force_tolerance_N": 1e-8}}
-    )
-    prepare_folder(folder, comm)
-    cantilever.run(case, Session(folder, comm, Path(), perf_counter()))
-    comm.barrier()
+    case = ff.make_case("cantilever", solver={"force_tolerance_N": 1e-8})
+    ff.run(case, folder)
     shape = pd.read_csv(folder / "shape.csv")
 
-    tow = section(case.tow)
+    keys = case.tow
+    # kg becomes tonne.
+    tow = ff.RectangularSection(
+        keys.width_mm, keys.height_mm, 1e-3 * keys.density_kg_mm3, keys.C1_MPa
+    )
     drops = {}
     for length, own in shape.groupby("length_mm"):
-        sheet = strip(case, float(length))
+        sheet = ff.spaced_sheet(
+            (0.0, float(length)),
+            (0.0, case.width_mm),
+            case.warp_spacing_mm,
+            case.weft_spacing_mm,
+        )
         hanging, crossing = len(sheet.weft_positions), len(sheet.warp_positions)
         tows_length = hanging * length + crossing * case.width_mm
         weight = tow.density * tow.area * tows_length * case.gravity_mm_s2 / length

@@ -22,19 +22,12 @@
 from pathlib import Path
 from typing import Any
 
-from fabric_fenicsx.loop.inference.search import diagnose_test
-from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
-from fabric_fenicsx.loop.measurement.reading import read_measurement
-from fabric_fenicsx.loop.report.content import test_report, write_report
-from fabric_fenicsx.loop.report.figures import data_figure, residual_figure
-from fabric_fenicsx.loop.report.page import write_page
-from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
-from fabric_fenicsx.rigs.load import load_case
+import fabric_fenicsx as ff
 
 CASE = Path(__file__).with_name("picture_frame.yaml")
 SETTINGS = ["hold_s=20", "travel_mm=80"]
 RATES = (35.0, 105.0, 60.0)  # mm/min; the last run is held out
-HIDDEN = Hidden("crossover_friction", "Dahl", {"m_c_N": 0.01, "slip_angle_rad": 0.02})
+HIDDEN = ff.Hidden("crossover_friction", "Dahl", {"m_c_N": 0.01, "slip_angle_rad": 0.02})
 NOISE = 0.05  # N, one sigma of a reading
 
 
@@ -49,17 +42,14 @@ def main(folder: Path = Path("results/demo_close_the_loop")) -> dict[str, Any]:
     """Go round the loop once; returns the report."""
     measured = folder / "measured"
     if not measured.exists():
-        case = load_case(CASE, SETTINGS)
-        write_measurement(measured, synthesise(case, [HIDDEN], NOISE, rates=RATES))
-    measurement = read_measurement(measured)
-    diagnosis = diagnose_test(PictureFrame([measurement]))
-    report = test_report(diagnosis, [measurement])
-    write_page(folder, [(diagnosis, report)])
-    write_report(folder, report)
+        case = ff.load_case(CASE, SETTINGS)
+        ff.write_measurement(measured, ff.synthesise(case, [HIDDEN], NOISE, rates=RATES))
+    found = ff.diagnose([ff.read_measurement(measured)], folder)
+    (diagnosis,) = found.diagnoses
     names = [f"{rate:g} mm/min" for rate in RATES]
-    data_figure(diagnosis, names).savefig(folder / "close_the_loop.png", dpi=150)
-    residual_figure(diagnosis).savefig(folder / "close_the_loop_residuals.png", dpi=150)
-    return report
+    ff.data_figure(diagnosis, names).savefig(folder / "close_the_loop.png", dpi=150)
+    ff.residual_figure(diagnosis).savefig(folder / "close_the_loop_residuals.png", dpi=150)
+    return found.report
 
 
 if __name__ == "__main__":

@@ -20,17 +20,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from fabric_fenicsx.fabric.gmsh_io import read_msh, write_msh
-from fabric_fenicsx.fabric.section import RectangularSection
-from fabric_fenicsx.fabric.sheet import centred_sheet
-from fabric_fenicsx.mechanics.tools import Mould
-from fabric_fenicsx.output.pictures import draw_net
-from fabric_fenicsx.output.record import prepare_folder
-from fabric_fenicsx.output.surfaces import TriangleSurface
-from fabric_fenicsx.rigs.simulation import simulate
-from fabric_fenicsx.solving.model import Model, Support
-from fabric_fenicsx.solving.parts import ContactLaw, CrossoverLaw
-from fabric_fenicsx.solving.stepping import GeneralisedAlpha, StepControl
+import fabric_fenicsx as ff
 
 MESHES = Path(__file__).parents[1] / "meshes"
 
@@ -42,9 +32,9 @@ MESHES = Path(__file__).parents[1] / "meshes"
 
 # %%
 SPACING = 8.0
-SECTION = RectangularSection(width=3.05, height=0.04, density=7e-9, C1=60000.0)
+SECTION = ff.RectangularSection(width=3.05, height=0.04, density=7e-9, C1=60000.0)
 AREA = SPACING**2
-CROSSINGS = CrossoverLaw(
+CROSSINGS = ff.CrossoverLaw(
     translation=100.0, k1=0.02 * AREA, k3=0.08 * AREA, dashpot=2.0 * AREA, alignment=450.0
 )
 
@@ -70,12 +60,12 @@ def holder_path(time: float) -> tuple[float, float, float]:
     return 0.0, 0.0, -1.0 + 1.2 * min(time / 6.0, 1.0)
 
 
-def moulds(shape: str) -> list[Mould]:
+def moulds(shape: str) -> list[ff.Mould]:
     """Punch, holder and die; the die is the holder's plate turned over."""
     plate = MESHES / f"{shape}_plate.stl"
-    holder = Mould.from_stl("holder", holder_path, plate, cell=CELL)
+    holder = ff.Mould.from_stl("holder", holder_path, plate, cell=CELL)
     return [
-        Mould.from_stl("punch", punch_path, MESHES / f"{shape}.stl", cell=CELL),
+        ff.Mould.from_stl("punch", punch_path, MESHES / f"{shape}.stl", cell=CELL),
         holder,
         holder.turned_over("die", lambda time: (0.0, 0.0, 0.0)),
     ]
@@ -101,45 +91,34 @@ def main(
     Returns:
         Height of the punch and of the sheet [mm], largest shear angle [degrees], Newton iterations.
     """
-    comm = MPI.COMM_WORLD
-    prepare_folder(folder, comm)
-    mesh = folder / "sheet.msh"
-    if comm.rank == 0:
-        write_msh(centred_sheet(*SIZES[shape], SPACING, SPACING, quarter=True), mesh)
-    comm.barrier()
-    net = read_msh(mesh)
-
-    # On the plane x = 0 a node keeps its x and turns about x only; likewise for y = 0.
-    on_x = np.flatnonzero(np.abs(net.points[:, 0]) < 1e-6)
-    on_y = np.flatnonzero(np.abs(net.points[:, 1]) < 1e-6)
+    net = ff.mesh(ff.centred_sheet(*SIZES[shape], SPACING, SPACING, quarter=True))
     tools = moulds(shape)
-    model = Model(
+    model = ff.Model(
         net,
         SECTION,
         crossovers=CROSSINGS,
         gravity=(0.0, 0.0, -9810.0),
-        inertia=GeneralisedAlpha(radius=0.0),
+        inertia=ff.GeneralisedAlpha(radius=0.0),
         viscosity=1.0,
         tools=tools,
-        contact_law=ContactLaw(stiffness=0.5, layer=0.5),
-        supports=[Support(on_x, (0, 4, 5)), Support(on_y, (1, 3, 5))],
-        comm=comm,
+        contact_law=ff.ContactLaw(stiffness=0.5, layer=0.5),
+        supports=ff.symmetry_planes(net),
     )
-    run = simulate(
+    run = ff.simulate(
         model,
         folder,
         test=shape,
         end=duration,
-        control=StepControl(first=0.1, smallest=1e-4, largest=3.0, largest_move=4.0),
-        force_tolerance=1e-4,
+        control=ff.StepControl(first=0.1, smallest=1e-4, largest=3.0, largest_move=4.0),
+        quarter=True,
     )
     if run.last is None:
         raise SystemExit(run.stop)
 
-    if comm.rank == 0:
+    if MPI.COMM_WORLD.rank == 0:
         colours = {"punch": "#8aa0b8", "holder": "#dfe3e8"}
         surfaces = [
-            TriangleSurface(
+            ff.TriangleSurface(
                 tool.name,
                 tool.surface.points,
                 tool.surface.cells,
@@ -150,7 +129,9 @@ def main(
             for tool in tools
             if tool.name in colours
         ]
-        draw_net(folder / f"{shape}.png", net, run.last, surfaces=surfaces, mirror=True, radius=1.3)
+        ff.draw_net(
+            folder / f"{shape}.png", net, run.last, surfaces=surfaces, mirror=True, radius=1.3
+        )
     return {
         "punch_mm": punch_path(run.last.time)[2],
         "sheet_mm": float((net.points + run.last.displacement)[:, 2].max()),

@@ -18,18 +18,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from fabric_fenicsx.fabric.gmsh_io import read_msh, write_msh
-from fabric_fenicsx.fabric.section import RectangularSection
-from fabric_fenicsx.fabric.sheet import centred_sheet
-from fabric_fenicsx.mechanics.tools import HoledPlate, Sphere
-from fabric_fenicsx.output.pictures import draw_net
-from fabric_fenicsx.output.record import prepare_folder
-from fabric_fenicsx.output.surfaces import RevolvedSurface
-from fabric_fenicsx.rigs.simulation import simulate
-from fabric_fenicsx.solving.generalised_alpha import GeneralisedAlpha
-from fabric_fenicsx.solving.model import Model, Support
-from fabric_fenicsx.solving.parts import ContactLaw, CrossoverLaw
-from fabric_fenicsx.solving.stepping import StepControl
+import fabric_fenicsx as ff
 
 # %% [markdown]
 # ## The fabric
@@ -39,9 +28,9 @@ from fabric_fenicsx.solving.stepping import StepControl
 
 # %%
 SPACING = 12.0
-SECTION = RectangularSection(width=4.57, height=0.04, density=7e-9, C1=60000.0)
+SECTION = ff.RectangularSection(width=4.57, height=0.04, density=7e-9, C1=60000.0)
 AREA = SPACING**2
-CROSSINGS = CrossoverLaw(
+CROSSINGS = ff.CrossoverLaw(
     translation=100.0, k1=0.02 * AREA, k3=0.08 * AREA, dashpot=2.0 * AREA, alignment=1000.0
 )
 
@@ -67,9 +56,9 @@ def holder_path(time: float) -> tuple[float, float, float]:
 
 
 TOOLS = [
-    Sphere("punch", punch_path, PUNCH_RADIUS),
-    HoledPlate("die", lambda time: (0.0, 0.0, 0.0), HOLE_RADIUS, EDGE_RADIUS, side=1.0),
-    HoledPlate("holder", holder_path, HOLE_RADIUS, EDGE_RADIUS, side=-1.0),
+    ff.Sphere("punch", punch_path, PUNCH_RADIUS),
+    ff.HoledPlate("die", lambda time: (0.0, 0.0, 0.0), HOLE_RADIUS, EDGE_RADIUS, side=1.0),
+    ff.HoledPlate("holder", holder_path, HOLE_RADIUS, EDGE_RADIUS, side=-1.0),
 ]
 
 
@@ -84,48 +73,41 @@ def main(folder: Path = Path("results/demo_drape"), duration: float = 60.0) -> d
     Returns:
         Punch depth [mm], largest shear angle [degrees] and Newton iterations.
     """
-    comm = MPI.COMM_WORLD
-    prepare_folder(folder, comm)
-    mesh = folder / "sheet.msh"
-    if comm.rank == 0:
-        write_msh(centred_sheet(288.0, 288.0, SPACING, SPACING, quarter=True), mesh)
-    comm.barrier()
-    net = read_msh(mesh)
+    net = ff.mesh(ff.centred_sheet(288.0, 288.0, SPACING, SPACING, quarter=True))
 
     # On the plane x = 0 a node keeps its x and turns about x only; likewise for y = 0.
     on_x = np.flatnonzero(np.abs(net.points[:, 0]) < 1e-6)
     on_y = np.flatnonzero(np.abs(net.points[:, 1]) < 1e-6)
-    symmetry = [Support(on_x, (0, 4, 5)), Support(on_y, (1, 3, 5))]
+    symmetry = [ff.Support(on_x, (0, 4, 5)), ff.Support(on_y, (1, 3, 5))]
 
-    model = Model(
+    model = ff.Model(
         net,
         SECTION,
         crossovers=CROSSINGS,
         gravity=(0.0, 0.0, -9810.0),
-        inertia=GeneralisedAlpha(radius=0.0),
+        inertia=ff.GeneralisedAlpha(radius=0.0),
         viscosity=1.0,
         tools=TOOLS,
-        contact_law=ContactLaw(stiffness=0.5, layer=0.5),
+        contact_law=ff.ContactLaw(stiffness=0.5, layer=0.5),
         supports=symmetry,
-        comm=comm,
     )
-    run = simulate(
+    run = ff.simulate(
         model,
         folder,
         test="drape",
         end=duration,
-        control=StepControl(first=0.1, smallest=1e-4, largest=3.0),
-        force_tolerance=1e-4,
+        control=ff.StepControl(first=0.1, smallest=1e-4, largest=3.0),
+        quarter=True,
     )
     if run.last is None:
         raise SystemExit(run.stop)
 
-    if comm.rank == 0:
+    if MPI.COMM_WORLD.rank == 0:
         surfaces = [
-            RevolvedSurface(tool.name, tool.profile(180.0), np.array(tool.path(run.last.time)))
+            ff.RevolvedSurface(tool.name, tool.profile(180.0), np.array(tool.path(run.last.time)))
             for tool in TOOLS[:2]
         ]
-        draw_net(folder / "drape.png", net, run.last, surfaces=surfaces, mirror=True)
+        ff.draw_net(folder / "drape.png", net, run.last, surfaces=surfaces, mirror=True)
     return {
         "depth_mm": SPEED * run.last.time,
         "largest_shear_deg": float(np.degrees(np.abs(run.last.shear_angle).max())),

@@ -11,17 +11,13 @@
 
 # %%
 from pathlib import Path
-from time import perf_counter
+from typing import Any
 
 from mpi4py import MPI
 
 import numpy as np
 
-from fabric_fenicsx.output.record import prepare_folder
-from fabric_fenicsx.rigs import drape
-from fabric_fenicsx.rigs.cases import DrapeCase
-from fabric_fenicsx.rigs.common import Session
-from fabric_fenicsx.rigs.load import load_case
+import fabric_fenicsx as ff
 
 CASE = Path(__file__).parent / "drape.yaml"
 
@@ -58,17 +54,14 @@ OUTWARD = {"points 6 mm inward": -6.0, "points 6 mm outward": 6.0}
 # %%
 def angles(folder: Path, settings: list[str], outward: float = 0.0) -> np.ndarray:
     """The five angles [degrees] of a variation."""
-    case = load_case(CASE, settings)
-    assert isinstance(case, DrapeCase)
+    case: Any = ff.load_case(CASE, settings)
     points = []
     for point in case.points:
         factor = 1.0 + outward / np.hypot(point.x_mm, point.y_mm)
         moved = {"x_mm": point.x_mm * factor, "y_mm": point.y_mm * factor}
         points.append(point.model_copy(update=moved))
     case = case.model_copy(update={"points": points})
-    comm = MPI.COMM_WORLD
-    prepare_folder(folder, comm)
-    result = drape.run(case, Session(folder, comm, Path(), perf_counter(), pictures=False))
+    result = ff.run(case, folder, pictures=False)
     if not result["completed"]:
         raise SystemExit(f"{settings}: {result['stopped_because']}")
     return np.array([point["angle_deg"] for point in result["quantities"]["points"]])

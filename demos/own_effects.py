@@ -21,21 +21,20 @@ from typing import Any
 
 from ufl import cosh, ln, tanh
 
-from fabric_fenicsx.inputs.parameters import Parameter
-from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw, Form, in_degrees, per_area
+import fabric_fenicsx as ff
 
 # %% [markdown]
 # What is fitted in a picture frame: the amplitude is zero where the effect is absent; every other
 # number has values from which a fit begins, and bounds; the unit stands at the end of its name.
 
 # %%
-TIGHTENING = Form(
+TIGHTENING = ff.Form(
     "stitch_tightening",
     "tanh",
     (
         {
-            "limit": Parameter("m_s_N", lower=0.0, amplitude=True, meaning="moment once tight"),
-            "angle": Parameter(
+            "limit": ff.Parameter("m_s_N", lower=0.0, amplitude=True, meaning="moment once tight"),
+            "angle": ff.Parameter(
                 "tight_angle_rad", (0.03, 0.1, 0.2), 0.01, 0.5, meaning="until tight"
             ),
         },
@@ -50,15 +49,15 @@ TIGHTENING = Form(
 
 # %%
 @dataclass(frozen=True)
-class Stitches(CrossingLaw):
+class Stitches(ff.CrossingLaw):
     """M = m_s tanh(γ / γ_s), elastic."""
 
-    limit: Any = per_area("m_s_N_mm", "moment per area once tight")
-    angle: Any = in_degrees("tight_angle_deg", "until tight")
+    limit: Any = ff.per_area("m_s_N_mm", "moment per area once tight")
+    angle: Any = ff.in_degrees("tight_angle_deg", "until tight")
 
     forms = (TIGHTENING,)
 
-    def moment(self, at: Crossing) -> Any:
+    def moment(self, at: ff.Crossing) -> Any:
         """Moment that resists γ."""
         return at.number(self.limit) * tanh(at.gamma / at.number(self.angle))
 

@@ -15,7 +15,6 @@
 import shutil
 import sys
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 from mpi4py import MPI
@@ -25,11 +24,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from scipy.interpolate import LinearNDInterpolator
 
-from fabric_fenicsx.output.record import prepare_folder
-from fabric_fenicsx.rigs import cantilever, drape, picture_frame
-from fabric_fenicsx.rigs.cases import CantileverCase, DrapeCase, PictureFrameCase
-from fabric_fenicsx.rigs.common import Session
-from fabric_fenicsx.rigs.load import load_case
+import fabric_fenicsx as ff
 
 HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"
@@ -67,12 +62,6 @@ def rms(angles: np.ndarray) -> float:
     return float(np.sqrt(np.mean((angles - MEASURED) ** 2)))
 
 
-def session(folder: Path) -> Session:
-    """A fresh folder to run a case in."""
-    prepare_folder(folder, MPI.COMM_WORLD)
-    return Session(folder, MPI.COMM_WORLD, Path(), perf_counter(), pictures=False)
-
-
 # %% [markdown]
 # ## The drape
 
@@ -94,12 +83,9 @@ def draped(
         f"contact.friction={friction}",
         *([] if force is None else [f"holder_force_N={force}"]),
     ]
-    case = load_case(HERE / "drape.yaml", settings)
-    assert isinstance(case, DrapeCase)
-    result = drape.run(case, session(folder))
+    result = ff.run(ff.load_case(HERE / "drape.yaml", settings), folder, pictures=False)
     if not result["completed"]:
         raise SystemExit(f"{settings}: {result['stopped_because']}")
-    MPI.COMM_WORLD.barrier()
     quantities = result["quantities"]
     return {
         "angles": np.array([point["angle_deg"] for point in quantities["points"]]),
@@ -160,17 +146,14 @@ def wave_table(rows: dict[tuple[int, float, float | None], dict[str, Any]]) -> s
 # %%
 def hung(folder: Path, spacing: int) -> pd.DataFrame:
     """Mid-lines of the three strips."""
-    case = CantileverCase.model_validate(
-        {
-            "test": "cantilever",
-            "tow": {"width_mm": WIDTHS[spacing]},
-            "warp_spacing_mm": spacing,
-            "weft_spacing_mm": spacing,
-            "solver": {"force_tolerance_N": 1e-8},
-        }
+    case = ff.make_case(
+        "cantilever",
+        tow={"width_mm": WIDTHS[spacing]},
+        warp_spacing_mm=spacing,
+        weft_spacing_mm=spacing,
+        solver={"force_tolerance_N": 1e-8},
     )
-    cantilever.run(case, session(folder))
-    MPI.COMM_WORLD.barrier()
+    ff.run(case, folder, pictures=False)
     return pd.read_csv(folder / "shape.csv")
 
 
@@ -184,16 +167,13 @@ def hung(folder: Path, spacing: int) -> pd.DataFrame:
 # %%
 def sheared(folder: Path, *, dashpot: float, C1: float, step: float = 4.0) -> pd.DataFrame:
     """The curve of a frame: force against angle and time."""
-    case = PictureFrameCase.model_validate(
-        {
-            "test": "picture_frame",
-            "tow": {"C1_MPa": C1},
-            "crossover": {"dashpot_N_s_mm": dashpot},
-            "solver": {"first_step_s": step, "largest_step_s": step},
-        }
+    case = ff.make_case(
+        "picture_frame",
+        tow={"C1_MPa": C1},
+        crossover={"dashpot_N_s_mm": dashpot},
+        solver={"first_step_s": step, "largest_step_s": step},
     )
-    picture_frame.run(case, session(folder))
-    MPI.COMM_WORLD.barrier()
+    ff.run(case, folder, pictures=False)
     return pd.read_csv(folder / "curve.csv")
 
 
@@ -481,8 +461,6 @@ def main(folder: Path = Path("results/paper")) -> dict[str, Any]:
         The page in Markdown; angles, their rms and the largest shear angle [degrees] of each drape
         by spacing, friction and sheet size; and what another C1 changes.
     """
-    comm = MPI.COMM_WORLD
-    prepare_folder(folder, comm)
     work = folder / "run"
     keys = [(s, mu, float(SHEETS[s])) for s in WIDTHS for mu in FRICTIONS] + [(10, 0.0, 280.0)]
     drapes = {key: draped(work, *key) for key in keys}
@@ -494,7 +472,7 @@ def main(folder: Path = Path("results/paper")) -> dict[str, Any]:
     }
     strips = {spacing: hung(work, spacing) for spacing in WIDTHS}
     curves, change = frames(work)
-    if comm.rank == 0:
+    if MPI.COMM_WORLD.rank == 0:
         draw_drapes(folder / "paper_drape.png", drapes)
         draw_strips(folder / "paper_cantilever.png", strips)
         draw_curves(folder / "paper_picture_frame.png", curves)

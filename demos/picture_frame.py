@@ -12,17 +12,13 @@
 
 # %%
 from pathlib import Path
-from time import perf_counter
 
 from mpi4py import MPI
 
 import numpy as np
 import pandas as pd
 
-from fabric_fenicsx.output.record import prepare_folder
-from fabric_fenicsx.rigs import picture_frame
-from fabric_fenicsx.rigs.cases import PictureFrameCase
-from fabric_fenicsx.rigs.common import Session
+import fabric_fenicsx as ff
 
 K1, K3, BETA = 0.02, 0.08, 2.0  # N/mm, N/mm, N s/mm
 
@@ -34,19 +30,14 @@ K1, K3, BETA = 0.02, 0.08, 2.0  # N/mm, N/mm, N s/mm
 # %%
 def load(folder: Path, beta: float) -> pd.DataFrame:
     """Load to 55 degrees at 35 mm/min; returns the curve that the rig writes."""
-    comm = MPI.COMM_WORLD
-    case = PictureFrameCase.model_validate(
-        {
-            "test": "picture_frame",
-            "hold_s": 0,
-            "unload": False,
-            "crossover": {"k1_N_mm": K1, "k3_N_mm": K3, "dashpot_N_s_mm": beta},
-            "solver": {"first_step_s": 2.0, "largest_step_s": 8.0},
-        }
+    case = ff.make_case(
+        "picture_frame",
+        hold_s=0,
+        unload=False,
+        crossover={"k1_N_mm": K1, "k3_N_mm": K3, "dashpot_N_s_mm": beta},
+        solver={"first_step_s": 2.0, "largest_step_s": 8.0},
     )
-    prepare_folder(folder, comm)
-    picture_frame.run(case, Session(folder, comm, Path(), perf_counter()))
-    comm.barrier()
+    ff.run(case, folder)
     return pd.read_csv(folder / "curve.csv")
 
 

@@ -18,20 +18,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
-from fabric_fenicsx.loop.inference.search import diagnose_test
-from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
-from fabric_fenicsx.loop.kinds.drape.model import Drape
-from fabric_fenicsx.loop.kinds.drape.shear_field import Solve, solved_field
-from fabric_fenicsx.loop.measurement.reading import FILE, SCHEMA, read_measurement
-from fabric_fenicsx.loop.report.content import test_report, write_report
-from fabric_fenicsx.loop.report.page import write_page
-from fabric_fenicsx.rigs.cases import DrapeCase
-from fabric_fenicsx.rigs.load import load_case
+import fabric_fenicsx as ff
 
 HERE = Path(__file__).parent
 DOCS = HERE.parent / "docs"
-SHIFT = next(e for e in DRAPE_EFFECTS if e.name == "punch_offset").variants[0]
 
 # %% [markdown]
 # ## The folder
@@ -40,12 +30,12 @@ SHIFT = next(e for e in DRAPE_EFFECTS if e.name == "punch_offset").variants[0]
 
 
 # %%
-def write_folder(folder: Path, case: DrapeCase) -> None:
+def write_folder(folder: Path, case: Any) -> None:
     """Table 4 as a measurement: five places with their angles and standard deviations."""
     folder.mkdir(parents=True, exist_ok=True)
     rig = ("punch_radius", "hole_radius", "punch_travel", "edge_radius")
     content = {
-        "schema": SCHEMA,
+        "schema": "fabric-measurement/1",
         "test": "drape",
         "title": "T-300 plain weave over a hemisphere, Wei & Zhang, Table 4",
         # Weighed, see the paper's equation 8.
@@ -60,7 +50,9 @@ def write_folder(folder: Path, case: DrapeCase) -> None:
     lines = ["x_mm,y_mm,angle_deg,std_deg"]
     lines += [f"{p.x_mm:g},{p.y_mm:g},{p.measured_deg},{p.std_deg}" for p in case.points]
     (folder / "angles.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    (folder / FILE).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    (folder / "measurement.yaml").write_text(
+        yaml.safe_dump(content, sort_keys=False), encoding="utf-8"
+    )
 
 
 # %% [markdown]
@@ -68,11 +60,17 @@ def write_folder(folder: Path, case: DrapeCase) -> None:
 
 
 # %%
-def points_table(drape: Drape, d: Diagnosis) -> list[str]:
+def steepness_of(drape: ff.Drape) -> np.ndarray:
+    """Largest change of the angle with the place, at each reading [degrees/mm], (n,)."""
+    (shift,) = next(e for e in drape.effects if e.name == "punch_offset").variants
+    _, slopes = drape.predict((shift,), {"dx_mm": 0.0, "dy_mm": 0.0})
+    return np.hypot(slopes["dx_mm"], slopes["dy_mm"])
+
+
+def points_table(drape: ff.Drape, d: Any) -> list[str]:
     """What the baseline says at each place, and how sure that is."""
     readings = drape.readings
-    _, slopes = drape.predict((SHIFT,), {"dx_mm": 0.0, "dy_mm": 0.0})
-    steepness = np.hypot(slopes["dx_mm"], slopes["dy_mm"])
+    steepness = steepness_of(drape)
     lines = [
         "| point | x, y | measured | model | measured − model | model's scatter | change per mm |",
         "|---|---|---|---|---|---|---|",
@@ -89,7 +87,7 @@ def points_table(drape: Drape, d: Diagnosis) -> list[str]:
     return lines
 
 
-def effects_table(d: Diagnosis) -> list[str]:
+def effects_table(d: Any) -> list[str]:
     """Every effect by itself."""
     lines = [
         "| effect | probability by chance | fitted | weighted rms left | left out in turn |",
@@ -109,7 +107,7 @@ def effects_table(d: Diagnosis) -> list[str]:
     return lines
 
 
-def conclusions(drape: Drape, d: Diagnosis) -> list[str]:
+def conclusions(drape: ff.Drape, d: Any) -> list[str]:
     """What the numbers allow to say."""
     n = len(drape.readings.observed)
     rms = float(np.sqrt(np.mean(d.baseline.residual**2)))
@@ -136,8 +134,9 @@ def conclusions(drape: Drape, d: Diagnosis) -> list[str]:
     return text
 
 
-def page(drape: Drape, d: Diagnosis, report: dict[str, Any]) -> str:
+def page(drape: ff.Drape, d: Any, report: dict[str, Any]) -> str:
     """docs/table4.md."""
+    steepness = float(np.sqrt(np.mean(steepness_of(drape) ** 2)))
     places: Sequence[str] = [
         "# What Table 4 says the model lacks",
         "",
@@ -169,7 +168,7 @@ def page(drape: Drape, d: Diagnosis, report: dict[str, Any]) -> str:
         "- All five points are in one quadrant of the sheet. An offset and a turn show as",
         "  differences between quadrants, so here they are free to imitate anything else.",
         "- The places are assumptions. With the changes per mm above, marks that lie 10 mm from",
-        f"  them could by themselves make residuals of {10.0 * _mean_steepness(drape):.0f}° rms.",
+        f"  them could by themselves make residuals of {10.0 * steepness:.0f}° rms.",
         "- What would decide: places read off the flat sheet before the draw, in all four",
         "  quadrants, some forty of them, and the fabric's own shear curve.",
         "",
@@ -180,33 +179,23 @@ def page(drape: Drape, d: Diagnosis, report: dict[str, Any]) -> str:
     return "\n".join(places) + "\n"
 
 
-def _mean_steepness(drape: Drape) -> float:
-    """Root mean square over the places of the largest change of the angle per mm."""
-    _, slopes = drape.predict((SHIFT,), {"dx_mm": 0.0, "dy_mm": 0.0})
-    return float(np.sqrt(np.mean(slopes["dx_mm"] ** 2 + slopes["dy_mm"] ** 2)))
-
-
 # %%
-def main(folder: Path = Path("results/table_4"), solve: Solve = solved_field) -> dict[str, Any]:
+def main(folder: Path = Path("results/table_4"), **model: Any) -> dict[str, Any]:
     """Write the folder, diagnose it and write its report.
 
     Args:
         folder: for the measurement and the report.
-        solve: from a case to its field; the finite elements.
+        model: of the drape, see `Drape`; as ``solve``, from a case to its field.
 
     Returns:
         The page in Markdown and the report.
     """
-    case = load_case(HERE / "drape.yaml")
-    assert isinstance(case, DrapeCase)
-    write_folder(folder / "measured", case)
-    measurement = read_measurement(folder / "measured")
-    drape = Drape([measurement], solve=solve)
-    d = diagnose_test(drape)
-    report = test_report(d, [measurement])
-    write_page(folder, [(d, report)])
-    write_report(folder, report)
-    return {"page": page(drape, d, report), "report": report}
+    write_folder(folder / "measured", ff.load_case(HERE / "drape.yaml"))
+    measurement = ff.read_measurement(folder / "measured")
+    drape = ff.Drape([measurement], **model)
+    found = ff.diagnose([measurement], folder, models={"drape": lambda *_: drape})
+    (diagnosis,) = found.diagnoses
+    return {"page": page(drape, diagnosis, found.report), "report": found.report}
 
 
 # %%

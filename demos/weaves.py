@@ -20,13 +20,7 @@ from mpi4py import MPI
 import matplotlib as mpl
 import numpy as np
 
-from fabric_fenicsx.fabric.crossings import crossing_numbers, reference_angle
-from fabric_fenicsx.fabric.gmsh_io import read_msh, write_msh
-from fabric_fenicsx.fabric.layout import TowLayout, spaced_layout
-from fabric_fenicsx.fabric.net import Net
-from fabric_fenicsx.fabric.outline import Circle, Outline, Polygon, rectangle
-from fabric_fenicsx.fabric.weave import WEAVES, WeavePattern, pattern_from_file
-from fabric_fenicsx.output.weaves import draw_weave
+import fabric_fenicsx as ff
 
 HERE = Path(__file__).parent
 
@@ -39,10 +33,10 @@ HERE = Path(__file__).parent
 
 # %%
 SPACING, CRIMP = 10.0, 1.7
-SQUARE = rectangle((-60.0, 60.0), (-60.0, 60.0))
-HERRINGBONE = pattern_from_file(HERE / "herringbone.txt")
+SQUARE = ff.rectangle((-60.0, 60.0), (-60.0, 60.0))
+HERRINGBONE = ff.pattern_from_file(HERE / "herringbone.txt")
 # What a notch cuts loose falls out.
-NOTCHED = Polygon(((-65, -50), (65, -50), (65, 50), (22, 50), (0, 5), (-22, 50), (-65, 50)))
+NOTCHED = ff.Polygon(((-65, -50), (65, -50), (65, 50), (22, 50), (0, 5), (-22, 50), (-65, 50)))
 
 
 @dataclass(frozen=True)
@@ -50,17 +44,17 @@ class Fabric:
     """A fabric to draw; widths and thicknesses are those of warp and weft."""
 
     title: str
-    pattern: WeavePattern
-    outline: Outline = SQUARE
+    pattern: ff.WeavePattern
+    outline: ff.Outline = SQUARE
     angles: tuple[float, float] = (90.0, 0.0)
     spacings: tuple[float | tuple[float, ...], float | tuple[float, ...]] = (SPACING, SPACING)
     width: tuple[float, float] = (9.3, 9.3)
     thickness: tuple[float, float] = (1.6, 1.6)
     crimp: float = CRIMP
 
-    def layout(self, subdivisions: int = 6) -> TowLayout:
+    def layout(self, subdivisions: int = 6) -> ff.TowLayout:
         """Its tows."""
-        return spaced_layout(
+        return ff.spaced_layout(
             self.outline,
             warp_angle=self.angles[0],
             weft_angle=self.angles[1],
@@ -73,24 +67,24 @@ class Fabric:
 
 
 FABRICS = {
-    "plain": Fabric("plain weave", WEAVES["plain"]),
-    "twill_2_2": Fabric("2/2 twill", WEAVES["twill_2_2"]),
-    "satin_5": Fabric("5-harness satin", WEAVES["satin_5"]),
+    "plain": Fabric("plain weave", ff.WEAVES["plain"]),
+    "twill_2_2": Fabric("2/2 twill", ff.WEAVES["twill_2_2"]),
+    "satin_5": Fabric("5-harness satin", ff.WEAVES["satin_5"]),
     "satin_8": Fabric(
-        "8-harness satin", WEAVES["satin_8"], rectangle((-80.0, 80.0), (-80.0, 80.0))
+        "8-harness satin", ff.WEAVES["satin_8"], ff.rectangle((-80.0, 80.0), (-80.0, 80.0))
     ),
-    "basket_2": Fabric("2 × 2 basket", WEAVES["basket_2"]),
+    "basket_2": Fabric("2 × 2 basket", ff.WEAVES["basket_2"]),
     "herringbone": Fabric("herringbone, drawn in a text file", HERRINGBONE),
-    "braid_30": Fabric("diamond braid at ±30°", WEAVES["plain"], angles=(30.0, -30.0)),
+    "braid_30": Fabric("diamond braid at ±30°", ff.WEAVES["plain"], angles=(30.0, -30.0)),
     "braid_45": Fabric(
         "regular braid at ±45°, cut to a disc",
-        WEAVES["twill_2_2"],
-        Circle(65.0),
+        ff.WEAVES["twill_2_2"],
+        ff.Circle(65.0),
         angles=(45.0, -45.0),
     ),
     "notched": Fabric(
         "3/1 twill of unequal spacing, cut to a polygon",
-        WEAVES["twill_3_1"],
+        ff.WEAVES["twill_3_1"],
         NOTCHED,
         spacings=(SPACING, 6.0),
         width=(9.3, 5.4),
@@ -99,7 +93,7 @@ FABRICS = {
     ),
     "unidirectional": Fabric(
         "unidirectional, stitched",
-        WEAVES["unidirectional"],
+        ff.WEAVES["unidirectional"],
         spacings=(SPACING, 20.0),
         width=(9.6, 0.7),
         thickness=(1.5, 0.5),
@@ -119,16 +113,16 @@ FABRICS = {
 
 
 # %%
-def net_of(fabric: Fabric, path: Path) -> Net:
+def net_of(fabric: Fabric, path: Path) -> ff.Net:
     """Mesh a fabric by gmsh and read the mesh."""
-    write_msh(fabric.layout(), path)
-    return read_msh(path, crossing_gap=fabric.crimp)
+    ff.write_msh(fabric.layout(), path)
+    return ff.read_msh(path, crossing_gap=fabric.crimp)
 
 
-def numbers_of(fabric: Fabric, net: Net) -> dict[str, float]:
+def numbers_of(fabric: Fabric, net: ff.Net) -> dict[str, float]:
     """What describes a fabric: floats, interlacing, crimp, angle between warp and weft."""
     weave = fabric.pattern
-    over = weave.over(*crossing_numbers(net))
+    over = weave.over(*ff.crossing_numbers(net))
     chords = net.points[net.ends[:, 1]] - net.points[net.ends[:, 0]]
     lengths = np.bincount(net.cell_tow, weights=net.lengths)
     plan = np.linalg.norm(chords[:, :2], axis=1)
@@ -138,9 +132,9 @@ def numbers_of(fabric: Fabric, net: Net) -> dict[str, float]:
         "float_warp": weave.float_length[0],
         "float_weft": weave.float_length[1],
         "longest_float": max(weave.longest_float),
-        "shear_stiffness": float(weave.interlacing(*crossing_numbers(net)).mean()),
+        "shear_stiffness": float(weave.interlacing(*ff.crossing_numbers(net)).mean()),
         "crimp_percent": 100.0 * float(lengths.sum() / plan.sum() - 1.0),
-        "angle_deg": 90.0 - float(np.degrees(np.median(reference_angle(net)))),
+        "angle_deg": 90.0 - float(np.degrees(np.median(ff.reference_angle(net)))),
     }
 
 
@@ -154,7 +148,7 @@ def main(folder: Path = Path("results/weaves"), *, pictures: bool = True) -> dic
         net = net_of(fabric, folder / f"{name}.msh")
         numbers[name] = numbers_of(fabric, net)
         if pictures:
-            draw_weave(
+            ff.draw_weave(
                 folder / f"{name}.png",
                 net,
                 width=fabric.width,

@@ -164,14 +164,14 @@ def constant(mesh: Any, value: float | tuple[float, ...]) -> Any:
     )
 
 
-def _merged(form: Any) -> Any:
-    """A form with one integral for each measure, or None.
+def _by_measure(form: ufl.Form) -> list[ufl.Form]:
+    """A form for each measure of a form, with one integral each.
 
-    UFL would do that itself, but only after expanding each integral for itself: it then has to
+    FFCx 0.5 takes a coefficient's value at the point of a one-point rule for that at the points of
+    any other rule in the same kernel: an integrand that is not linear in it comes out wrong. The
+    integrals of one measure are summed here because UFL would expand each for itself first and then
     compare what they share node by node, which took most of the time of a compilation.
     """
-    if form is None:
-        return None
     groups: dict[str, list[Any]] = {}
     for integral in form.integrals():
         measure = (
@@ -181,12 +181,10 @@ def _merged(form: Any) -> Any:
             sorted(integral.metadata().items()),
         )
         groups.setdefault(repr(measure), []).append(integral)
-    return ufl.Form(
-        [
-            group[0].reconstruct(sum((one.integrand() for one in group[1:]), group[0].integrand()))
-            for group in groups.values()
-        ]
-    )
+    return [
+        ufl.Form([one.reconstruct(sum((o.integrand() for o in others), one.integrand()))])
+        for one, *others in groups.values()
+    ]
 
 
 def compile_form(form: ufl.Form, comm: MPI.Comm, *, here: bool = True) -> Any:
@@ -198,12 +196,12 @@ def compile_form(form: ufl.Form, comm: MPI.Comm, *, here: bool = True) -> Any:
         here: whether this rank has cells of the form's mesh (else it only waits).
 
     Returns:
-        The compiled form, or None where ``here`` is false.
+        The compiled form, a kernel for each of its measures, or None where ``here`` is false.
     """
     options = "jit_options" if "jit_options" in _FORM_OPTIONS else "jit_params"
 
-    def compiled() -> Any:
-        return fem.form(_merged(form), **{options: dict(_JIT_OPTIONS)})
+    def compiled() -> list[Any]:
+        return [fem.form(part, **{options: dict(_JIT_OPTIONS)}) for part in _by_measure(form)]
 
     result = None
     own_mesh = here and form.ufl_domain().ufl_cargo().comm.size == 1
@@ -222,7 +220,8 @@ def compile_form(form: ufl.Form, comm: MPI.Comm, *, here: bool = True) -> Any:
 
 def add_vector(array: npt.NDArray[np.float64], form: Any) -> None:
     """Add a linear form to an array over this rank's own and ghost dofs."""
-    fem.assemble_vector(array, form)
+    for part in form:
+        fem.assemble_vector(array, part)
 
 
 def add_matrix(matrix: PETSc.Mat, form: Any) -> None:
@@ -230,19 +229,20 @@ def add_matrix(matrix: PETSc.Mat, form: Any) -> None:
 
     Not collective, unlike dolfinx's own wrapper, which flushes the matrix each time.
     """
-    kernel = getattr(form, "_cpp_object", form)
-    dolfinx.cpp.fem.petsc.assemble_matrix(
-        matrix,
-        kernel,
-        dolfinx.cpp.fem.pack_constants(kernel),
-        dolfinx.cpp.fem.pack_coefficients(kernel),
-        [],
-    )
+    for part in form:
+        kernel = getattr(part, "_cpp_object", part)
+        dolfinx.cpp.fem.petsc.assemble_matrix(
+            matrix,
+            kernel,
+            dolfinx.cpp.fem.pack_constants(kernel),
+            dolfinx.cpp.fem.pack_coefficients(kernel),
+            [],
+        )
 
 
 def cell_scalar(form: Any) -> float:
     """Integral of a functional over this rank's own cells (sum over ranks for the whole)."""
-    return float(fem.assemble_scalar(form))
+    return float(sum(fem.assemble_scalar(part) for part in form))
 
 
 def cell_dofs(space: Any) -> npt.NDArray[np.int64]:

@@ -7,19 +7,20 @@ The files go beside this script unless another folder is given. Lengths are in m
 import sys
 from pathlib import Path
 
-from fabric_fenicsx.fabric.gmsh_io import write_msh
-from fabric_fenicsx.fabric.sheet import Sheet, centred_sheet, spaced_sheet
+import fabric_fenicsx as ff
 
 SPACING = 12.0
 INCH = 25.4
 
-SHEETS: dict[str, Sheet] = {
+SHEETS: dict[str, ff.Sheet] = {
     # A quarter of a square blank; x = 0 and y = 0 are its symmetry planes.
-    "drape_12mm": centred_sheet(288.0, 288.0, SPACING, SPACING, subdivisions=2, quarter=True),
+    "drape_12mm": ff.centred_sheet(288.0, 288.0, SPACING, SPACING, subdivisions=2, quarter=True),
     # The sheared square inside the frame, a corner at the origin.
-    "picture_frame_12mm": spaced_sheet((0.0, 96.0), (0.0, 96.0), SPACING, SPACING, subdivisions=2),
+    "picture_frame_12mm": ff.spaced_sheet(
+        (0.0, 96.0), (0.0, 96.0), SPACING, SPACING, subdivisions=2
+    ),
     # A strip of 3 x 6 inches, clamped at x = 0; the weft tows hang over.
-    "cantilever_12mm": spaced_sheet(
+    "cantilever_12mm": ff.spaced_sheet(
         (0.0, 6.0 * INCH), (0.0, 3.0 * INCH), SPACING, SPACING, subdivisions=2
     ),
 }
@@ -28,7 +29,7 @@ SHEETS: dict[str, Sheet] = {
 def main(folder: Path = Path(__file__).parent) -> None:
     """Write every mesh into a folder that exists."""
     for name, sheet in SHEETS.items():
-        write_msh(sheet, folder / f"{name}.msh")
+        ff.write_msh(sheet, folder / f"{name}.msh")
 
 
 if __name__ == "__main__":

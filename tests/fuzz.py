@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from fabric_fenicsx.rigs.cases import CASES
+from fabric_fenicsx.rigs.registry import RIGS
 from fabric_fenicsx.rigs.write_case import template
 
 DEMOS = Path(__file__).parents[1] / "demos"
@@ -29,7 +29,7 @@ TEXTS = ("{", "]", ":", "- ", "\t", "&a ", "*a", "!!python/name:os.system", "%YA
 def originals() -> list[str]:
     """Texts of valid cases: the demos, and a template of each rig."""
     return [path.read_text(encoding="utf-8") for path in sorted(DEMOS.glob("*.yaml"))] + [
-        template(rig) for rig in CASES
+        template(rig) for rig in RIGS
     ]
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fabric_fenicsx.fabric.chains import net_from_lines
+from fabric_fenicsx.fabric.net import WEFT, Net
 from fabric_fenicsx.solving.model import Model
 from fabric_fenicsx.solving.stepping import StepControl, Stepper
 
@@ -117,6 +118,16 @@ def plain_net(n_warp: int, n_weft: int, spacing: float, subdivisions: int):
             nodes = first + np.arange(len(along))
             lines[family].append(np.column_stack([nodes[:-1], nodes[1:]]))
     return net_from_lines(np.vstack(points), np.vstack(lines[0]), np.vstack(lines[1]))[0]
+
+
+def raised(net: Net, height: float) -> Net:
+    """The net with its weft tows moved along z, off the warp."""
+    points = net.points.copy()
+    points[net.node_family == WEFT, 2] += height
+    return Net(
+        points=points,
+        **{name: getattr(net, name) for name in Net.__slots__ if name != "points"},
+    )
 
 
 def set_state(model: Model, u, q) -> None:

@@ -12,9 +12,10 @@ from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.starts import fit_from_grid
+from fabric_fenicsx.loop.kinds.cantilever import CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.hanging import HangingTow
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
-from fabric_fenicsx.loop.measurement.reading import CantileverRig, FabricKeys, Measurement, Run
+from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 
 WIDTH, HEIGHT, SPACING = 4.57, 0.04, 12.0
 DENSITY = 0.6  # kg/m²

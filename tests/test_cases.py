@@ -1,14 +1,19 @@
 """Case files: what is read, and the one line that each mistake gets."""
 
+import subprocess
+import sys
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from fabric_fenicsx.errors import InputError
-from fabric_fenicsx.inputs.keys import documented, plain
-from fabric_fenicsx.rigs.cases import CASES, CantileverCase, DrapeCase
+from fabric_fenicsx.inputs.keys import documented, one_of, plain
+from fabric_fenicsx.rigs.cantilever import CantileverCase
+from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
+from fabric_fenicsx.rigs.registry import RIGS, rig
 
 DEMOS = Path(__file__).parents[1] / "demos"
 
@@ -126,7 +131,7 @@ def test_several_mistakes_are_counted(tmp_path):
     [
         ("", "empty, allowed is a mapping of keys"),
         ("- 1\n", "[1], allowed is a mapping of keys"),
-        ("sheet: {}\n", "test: missing, allowed is drape, picture_frame or cantilever"),
+        ("sheet: {}\n", f"test: missing, allowed is {one_of(RIGS)}"),
         ("test: drap\n", "test: 'drap', did you mean drape?"),
         ("test: [drape]\n", "test: ['drape'], allowed is drape"),
         ("test: drape\nsheet: {width_mm: 3\n", "line 3, column 1: "),
@@ -178,18 +183,18 @@ def test_a_bad_setting_names_the_option(tmp_path, setting, expected):
 
 
 def test_every_key_is_documented():
-    for model in CASES.values():
-        rows = {row.name: row for row in documented(model)}
+    for name in RIGS:
+        rows = {row.name: row for row in documented(rig(name).case)}
         assert len(rows) > 20
         for row in rows.values():
             assert row.description and row.allowed and row.default
-    rows = {row.name: row for row in documented(CASES["drape"])}
+    rows = {row.name: row for row in documented(rig("drape").case)}
     assert rows["crossover.alignment_N_mm"].unit == "N mm"
     assert rows["crossover.k1_N_mm"].unit == "N/mm"
     assert rows["tow.density_kg_mm3"].unit == "kg/mm³"
     assert rows["points[].x_mm"].default == "needed"
     assert rows["sheet.subdivisions"].allowed == "a whole number from 1 to 64"
-    assert CASES["cantilever"] is CantileverCase
+    assert rig("cantilever").case is CantileverCase
 
 
 def test_long_values_are_shortened():
@@ -240,3 +245,37 @@ def test_shear_laws_become_laws_of_a_crossing(tmp_path):
     friction = law.build(144.0)
     assert friction.limit == pytest.approx(1.44)
     assert friction.stiffness == pytest.approx(1.44 / np.radians(1.0))
+
+
+def test_a_rig_is_called_like_its_file_and_an_unknown_one_is_told_the_names():
+    for name in RIGS:
+        assert get_args(rig(name).case.model_fields["test"].annotation) == (name,)
+    with pytest.raises(InputError, match=f"^test: nothing, allowed is {one_of(RIGS)}$"):
+        rig("nothing")
+
+
+def test_a_case_is_read_and_laid_out_without_dolfinx(tmp_path):
+    """Reading must not wait for what only a run needs."""
+    code = """
+import sys
+from pathlib import Path
+from fabric_fenicsx.rigs.load import load_case
+from fabric_fenicsx.rigs.registry import RIGS, rig
+for name in RIGS:
+    path = Path(sys.argv[1]) / "case.yaml"
+    path.write_text(f"test: {name}")
+    case = load_case(path)
+    assert rig(name).fabrics(case, Path())
+heavy = {"dolfinx", "petsc4py", "mpi4py", "pyvista", "gmsh", "matplotlib"} & set(sys.modules)
+assert not heavy, heavy
+"""
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=True, timeout=60)
+
+
+def test_a_sheet_is_checked_with_its_own_weave(tmp_path):
+    """Its spacings, whatever the sheet's, and its outline; the file of a pattern is not read."""
+    sheet = "test: drape\nsymmetry: none\nsheet: {width_mm: 20, length_mm: 20}\n"
+    small = "weave: {pattern: nothing.txt, warp_spacings_mm: [4], weft_spacings_mm: [4]}\n"
+    assert load_case(written(tmp_path, sheet + small)).weave is not None
+    said = message(written(tmp_path, sheet + small.replace("[4]", "[24]")))
+    assert "warp spacing is [24.0] mm; the outline is 20 mm wide" in said

@@ -3,17 +3,19 @@
 import csv
 import json
 import os
+import shutil
 import subprocess
 import sys
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fabric_fenicsx import __version__
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.cli.app import EXAMPLES
-from fabric_fenicsx.inputs.keys import documented
-from fabric_fenicsx.rigs.cases import CASES
+from fabric_fenicsx.inputs.keys import documented, one_of
+from fabric_fenicsx.rigs.registry import RIGS, rig
 
 TINY = """\
 test: drape
@@ -123,6 +125,17 @@ def test_run_prints_a_summary(completed):
     for text in ("punch force", "measured", "paper", "this run", "88", "87"):
         assert text in process.stdout
     assert "Traceback" not in process.stderr
+
+
+def test_fibres_need_no_paraview_folder(completed, tmp_path):
+    """Of the step files alone: every angle of the quarter's table, four times."""
+    folder = tmp_path / "kept"
+    shutil.copytree(completed[0], folder, ignore=shutil.ignore_patterns("paraview", "*.csv"))
+    process = command("fibres", folder)
+    assert process.returncode == 0, process.stderr
+    shear = np.sort(pd.read_csv(folder / "fibres.csv")["shear_deg"].abs())
+    angles = pd.read_csv(completed[0] / "crossings.csv")["angle_deg"]
+    np.testing.assert_allclose(shear, np.sort(np.repeat(90.0 - angles, 4)), atol=1e-6)
 
 
 def test_quiet_prints_nothing(case, tmp_path):
@@ -254,13 +267,13 @@ def test_missing_case_file_makes_no_folder(tmp_path):
 def test_an_error_on_one_rank_ends_all(case, tmp_path):
     code = """
 from mpi4py import MPI
-import fabric_fenicsx.output.record as record
+import fabric_fenicsx.rigs.run as run
 from fabric_fenicsx.__main__ import main
 def broken(folder, comm):
     if comm.rank == 1:
         raise RuntimeError("on one rank")
     comm.barrier()
-record.prepare_folder = broken
+run.prepare_folder = broken
 main()
 """
     process = command("run", case, "--out", tmp_path, code=code, ranks=2, timeout=60)
@@ -292,14 +305,12 @@ def test_no_command_shows_the_help():
 def test_keys_lists_every_field(options):
     process = command("keys", *options)
     assert process.returncode == 0
-    for model in CASES.values():
-        for row in documented(model):
+    for name in RIGS:
+        for row in documented(rig(name).case):
             assert row.name in process.stdout
     process = command("keys", "nothing")
     assert process.returncode == 2
-    assert own_lines(process.stderr) == [
-        "keys: nothing, allowed is drape, picture_frame or cantilever"
-    ]
+    assert own_lines(process.stderr) == [f"keys: nothing, allowed is {one_of(RIGS)}"]
 
 
 def test_help_and_keys_need_no_dolfinx():

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,10 @@ from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.cli import doctor
 from fabric_fenicsx.fabric.gmsh_io import read_msh
 from fabric_fenicsx.inputs.keys import documented
-from fabric_fenicsx.rigs.cases import CASES
+from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.estimate import estimate
 from fabric_fenicsx.rigs.load import load_case
+from fabric_fenicsx.rigs.registry import RIGS, rig
 from fabric_fenicsx.rigs.write_case import case_text, template
 
 DEMOS = Path(__file__).parents[1] / "demos"
@@ -28,26 +30,26 @@ def command(*arguments):
     return int(ended.value.code or 0)
 
 
-@pytest.mark.parametrize("rig", CASES)
-def test_new_writes_the_defaults_with_every_key(rig, tmp_path, capsys):
+@pytest.mark.parametrize("name", RIGS)
+def test_new_writes_the_defaults_with_every_key(name, tmp_path, capsys):
     path = tmp_path / "mine.yaml"
-    assert command("new", rig, path) == 0
+    assert command("new", name, path) == 0
     assert capsys.readouterr().out == f"{path}\n"
-    assert load_case(path) == CASES[rig](test=rig)
+    assert load_case(path) == rig(name).case(test=name)
     text = path.read_text(encoding="utf-8")
-    for key in documented(CASES[rig]):
+    for key in documented(rig(name).case):
         assert f"{key.name.replace('[]', '').split('.')[-1]}:" in text
     assert max(map(len, text.splitlines())) <= 120
     path.write_text("mine")
-    assert command("new", rig, path) == 2
+    assert command("new", name, path) == 2
     assert "exists, allowed is a new file" in capsys.readouterr().err
     assert path.read_text() == "mine"
 
 
-@pytest.mark.parametrize("rig", CASES)
-def test_a_template_without_its_comments_marks_is_valid(rig, tmp_path):
+@pytest.mark.parametrize("name", RIGS)
+def test_a_template_without_its_comments_marks_is_valid(name, tmp_path):
     """What stands there as a comment is a key at its place: with a value it is taken."""
-    text = template(rig).replace("# title:", "title: a title").replace("# mesh:", "mesh: a.msh")
+    text = template(name).replace("# title:", "title: a title").replace("# mesh:", "mesh: a.msh")
     path = tmp_path / "mine.yaml"
     path.write_text(text, encoding="utf-8")
     case = load_case(path)
@@ -99,6 +101,22 @@ def test_estimates_rise_with_the_mesh_and_the_steps():
     # The demo's own figures: 73 steps, 283 iterations, 8 s.
     assert one.steps == pytest.approx(73, rel=0.1)
     assert one.iterations == pytest.approx(283, rel=0.1)
+
+
+def test_a_rig_without_figures_for_an_estimate_says_so(capsys, monkeypatch):
+    monkeypatch.setattr(drape, "RIG", replace(drape.RIG, steps=None))
+    assert command("check", DEMOS / "drape.yaml") == 0
+    assert "no estimate of steps and time: drape gives no figures" in capsys.readouterr().out
+
+
+def test_an_outline_without_a_crossing_is_one_line(tmp_path, capsys):
+    """A band along y = x + 5: the x and y of crossings, 12 mm apart, differ by multiples of 12."""
+    case = tmp_path / "case.yaml"
+    outline = "[[-30, -25.5], [24, 28.5], [24, 29.5], [-30, -24.5]]"
+    case.write_text(f"test: drape\nsymmetry: none\nweave: {{outline: {outline}}}\n")
+    assert command("check", case) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "none cross within the outline" in line
 
 
 def test_mesh_writes_what_a_run_would_mesh(tmp_path, capsys):

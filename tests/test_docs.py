@@ -6,18 +6,23 @@ one after `<!-- file: NAME -->` is a file that they use.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
 import yaml
 
+from fabric_fenicsx import rigs
+from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.loop.kinds.cantilever.effects import CANTILEVER_EFFECTS
 from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
 from fabric_fenicsx.loop.kinds.picture_frame.effects import PICTURE_FRAME_EFFECTS
+from fabric_fenicsx.rigs import load, registry
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -102,6 +107,34 @@ def test_commands_of_a_page(place, page):
 def test_all_commands_of_a_page(place, page):
     (place / "mine.yaml").unlink(missing_ok=True)
     run_page(place, page, slow=True)
+
+
+def test_the_rig_of_the_contributors_page(tmp_path, monkeypatch, capsys):
+    """The page's file and its line, and every command knows it; n E A Δ/L with E = 6 C1."""
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split("## A new rig")[1]
+    (tmp_path / "tensile_strip.py").write_text(re.search(r"```python\n(.*?)```", text, re.S)[1])
+    monkeypatch.setattr(rigs, "__path__", [*rigs.__path__, str(tmp_path)])
+    for module in (registry, load):
+        monkeypatch.setattr(module, "RIGS", (*registry.RIGS, "tensile_strip"))
+    case, out = tmp_path / "case.yaml", tmp_path / "out"
+    case.write_text("test: tensile_strip\nwarp_spacing_mm: 8\n")
+    for command in (
+        ["keys", "tensile_strip"],
+        ["check", case],
+        ["run", case, "--out", out],
+        ["fibres", out],
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main([*map(str, command)])
+        assert ended.value.code in (None, 0), capsys.readouterr().err
+    assert "travel_mm" in capsys.readouterr().out
+    force = json.loads((out / "result.json").read_text())["quantities"]["force_N"]
+    curve = pd.read_csv(out / "curve.csv")
+    exact = 6 * 6.0 * 60000.0 * 4.57 * 0.04 * curve["displacement_mm"] / 96.0
+    assert curve["displacement_mm"].iloc[-1] == pytest.approx(1.0)
+    assert curve["force_N"].to_numpy() == pytest.approx(exact.to_numpy(), rel=1e-3)
+    assert force == pytest.approx(curve["force_N"].max())
+    monkeypatch.delitem(sys.modules, "fabric_fenicsx.rigs.tensile_strip")
 
 
 def test_blocks_are_marked_as_what_they_are():

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from test_demos import demo
 
 from fabric_fenicsx.errors import InputError, SolveError
+from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
@@ -23,12 +24,10 @@ from fabric_fenicsx.loop.kinds.drape.shear_field import (
     hermite_weights,
     solved_field,
 )
-from fabric_fenicsx.loop.measurement.reading import read_measurement
 from fabric_fenicsx.loop.report.content import test_report as report_of
 from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
-from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session, control
-from fabric_fenicsx.rigs.drape import build
+from fabric_fenicsx.rigs.drape import DrapeCase, build
 from fabric_fenicsx.rigs.simulation import simulate
 from fabric_fenicsx.solving.parts import ContactLaw
 
@@ -304,6 +303,8 @@ def test_the_law_of_other_tests_is_taken(tmp_path):
     assert cases[0].tow.C1_MPa == 2000.0
     assert "fitted to the other tests" in drape.notes[0]
     assert "fitted to the other tests" in drape.notes[1]
+    assert any("k1_N = -0.01" in note and "negative" in note for note in drape.notes)
+    assert not any("k3_N" in note for note in drape.notes)
 
 
 def test_the_case_weighs_what_the_fabric_does(tmp_path):

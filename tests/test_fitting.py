@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from measurements.sets import sixty
 
+from fabric_fenicsx.errors import SolveError
+from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.effects import Parameter
 from fabric_fenicsx.loop.inference.experiment import Readings
 from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
-from fabric_fenicsx.loop.measurement.reading import read_measurement
 
 
 class Line:
@@ -48,15 +50,15 @@ def fitted(seed):
     return line, fit(line, (), {"a": 0.0, "b": 0.0}, line.readings.fit)
 
 
-def test_what_is_foreseen_is_the_textbook_s():
+def test_the_predictive_check_is_the_textbook_s():
     line, model = fitted(1)
     out = line.readings.holdout
     J = np.column_stack([np.ones_like(line.t), line.t])
     C = np.linalg.inv(J[~out].T @ J[~out])
     r = model.residual[out]
     exact = r @ np.linalg.solve(np.eye(out.sum()) + J[out] @ C @ J[out].T, r)
-    assert model.foreseen(out) == pytest.approx(np.sqrt(exact / out.sum()), rel=1e-9)
-    assert np.isnan(model.foreseen(np.zeros_like(out)))
+    assert model.predictive_rms(out) == pytest.approx(np.sqrt(exact / out.sum()), rel=1e-9)
+    assert np.isnan(model.predictive_rms(np.zeros_like(out)))
     doubt = model.error_of({"a": np.ones(2), "b": np.array([0.0, 3.5])}, noise=0.0)
     scatter = np.sqrt(model.sum_of_squares / 38)
     expected = [np.sqrt(C[0, 0]), np.sqrt(np.array([1, 3.5]) @ C @ np.array([1, 3.5]))]
@@ -68,7 +70,7 @@ def test_an_extrapolated_line_is_no_surprise():
     for seed in range(300):
         line, model = fitted(seed)
         raw.append(model.rms(line.readings.holdout) ** 2)
-        foreseen.append(model.foreseen(line.readings.holdout) ** 2)
+        foreseen.append(model.predictive_rms(line.readings.holdout) ** 2)
     # χ² of 30 over 30: its mean over 300 lines is known to 0.015.
     assert np.mean(foreseen) == pytest.approx(1.0, abs=0.06)
     assert np.mean(raw) > 2.5
@@ -90,7 +92,50 @@ def test_what_the_data_do_not_tell_is_not_certain():
     # However large the doubt, what no parameter can change must still be foreseen.
     out = line.readings.holdout
     lost = replace(model, root=1e20 * model.root)
-    assert lost.foreseen(out) == pytest.approx(np.std(model.residual[out]), rel=1e-6)
+    assert lost.predictive_rms(out) == pytest.approx(np.std(model.residual[out]), rel=1e-6)
+
+
+class Exponential(Line):
+    """exp(-a t), which a fit does not reach in two evaluations; without noise."""
+
+    baseline = (Parameter("a", (0.1,)),)
+
+    def __init__(self):
+        super().__init__(np.random.default_rng(0))
+        self.readings = replace(self.readings, observed=np.exp(-5.0 * self.t))
+
+    def predict(self, variants, values):
+        y = np.exp(-values["a"] * self.t)
+        return y, {"a": -self.t * y}
+
+
+def test_a_fit_that_ends_at_its_cap_has_not_converged():
+    line = Exponential()
+    stopped, done = (
+        fit(line, (), {"a": 0.1}, line.readings.fit, evaluations=count) for count in (2, 60)
+    )
+    assert not stopped.converged and stopped.values["a"] < 4.0
+    assert done.converged and done.values["a"] == pytest.approx(5.0, rel=1e-6)
+
+
+def test_parts_that_cannot_be_predicted_are_counted():
+    class Failing(Line):
+        def predict(self, variants, values):
+            if values["a"] == 0.0 and values["b"] == 0.0 and self.starting:
+                raise SolveError("no solution at the start")
+            return super().predict(variants, values)
+
+    line = Failing(np.random.default_rng(2))
+    line.starting = False
+    line.readings = replace(line.readings, holdout=np.zeros(70, dtype=bool))
+    judge = Judge(line)
+    model = fit(line, (), {"a": 0.0, "b": 0.0}, judge.rows)
+    whole = judge.cross_validated(model)
+    assert (whole.parts, whole.failed) == (2, 0) and 1.0 < whole.error < 10.0
+    # The same model with values that have no solution to begin with: no part is predicted.
+    line.starting = True
+    none = judge.cross_validated(replace(model, values={"a": 0.0, "b": 0.0}))
+    assert (none.parts, none.failed) == (2, 2) and np.isnan(none.error)
 
 
 def diagnosed(seed, name):

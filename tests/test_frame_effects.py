@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.kinds.picture_frame import PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
-from fabric_fenicsx.loop.measurement.reading import FabricKeys, Measurement, PictureFrameRig, Run
+from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 
 LENGTH, FABRIC, TRAVEL, SIGMA = 192.0, 96.0, 60.0, 0.02
 K1, K3, C1 = 0.05, 0.2, 1.5
@@ -75,11 +76,11 @@ def test_play_is_found_by_what_happens_at_the_turns(form, behind, ahead):
     travel = found.final.values["free_travel_mm"]
     assert travel == pytest.approx(max(behind, ahead), abs=0.1)
     assert found.holdout_after < 1.15 * SIGMA
-    # Without the play just these stand out as spikes would.
+    # Without the play just these stand out as outliers would.
     assert not found.outliers.any()
 
 
-def test_spikes_are_left_out_beside_play():
+def test_outliers_are_left_out_beside_play():
     spoil = (37, 112)
     found = diagnosed(follow=lambda D: followed(D, 1.0, 0.0), spoil=spoil)
     assert [e.name for e in found.effects] == ["crosshead_backlash"]

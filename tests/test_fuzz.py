@@ -12,7 +12,7 @@ from fuzz_measurements import broken
 
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.errors import InputError
-from fabric_fenicsx.loop.measurement.reading import read_measurement
+from fabric_fenicsx.loop.diagnose import read_measurement
 
 MEMORY = 6 << 30
 """Bytes of address space that a broken number must not reach."""

@@ -4,21 +4,28 @@ After Crisfield & Jelenić (Proc. R. Soc. A 455, 1999): a rigid turn of a loaded
 net changes no energy, and the same loads by another path lead to the same end.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from solve import (
     GivenSection,
     Statics,
+    matrix,
     plain_net,
     random_rotation,
     set_loads,
     set_state,
 )
 
+from fabric_fenicsx.fabric.gmsh_io import read_msh, write_msh
+from fabric_fenicsx.fabric.layout import spaced_layout
 from fabric_fenicsx.fabric.net import Net, single_tow
+from fabric_fenicsx.fabric.outline import rectangle
 from fabric_fenicsx.fabric.section import RectangularSection
+from fabric_fenicsx.fabric.weave import WEAVES
 from fabric_fenicsx.solving.model import CrossoverLaw, Model, Support
-from fabric_fenicsx.solving.update import compose
+from fabric_fenicsx.solving.update import advance_fields, compose, rotate
 
 SECTION = GivenSection((400.0, 150.0, 150.0, 60.0, 50.0, 90.0))
 LAW = CrossoverLaw(translation=40.0, k1=5.0, k3=2.0, dashpot=0.0, alignment=8.0)
@@ -132,6 +139,87 @@ def test_the_path_does_not_matter(loaded):
     # Two of the three loads do not lead there.
     part = run(*make(), steps=5, order=(0, 1))
     assert np.abs(part.displacements - u).max() > 1.0
+
+
+# Every weave, crimped and flat --------------------------------------------------------------------
+
+BRAID = {"warp_angle": 60.0, "weft_angle": -15.0}
+FABRICS = {name: (name, {}) for name in WEAVES} | {"braid": ("twill_2_2", BRAID)}
+
+
+def woven(path, fabric, crimp, slip_limit):
+    """A small piece of a fabric, its crossings held by springs that slip or do not."""
+    pytest.importorskip("gmsh")
+    name, angles = FABRICS[fabric]
+    outline = rectangle((-21.0, 21.0), (-17.0, 17.0))
+    size = {"warp_spacing": 10.0, "weft_spacing": 8.0, "subdivisions": 2}
+    layout = spaced_layout(outline, crimp=crimp, pattern=WEAVES[name], **size, **angles)
+    write_msh(layout, path / "tows.msh")
+    net = read_msh(path / "tows.msh", crossing_gap=crimp)
+    return Model(net, SECTION, crossovers=replace(LAW, slip_limit=slip_limit))
+
+
+def strained(model):
+    """A state far from the reference, accepted as a step: crossings with a limit have slipped.
+
+    Returns:
+        Displacements and quaternions.
+    """
+    rng, disc = np.random.default_rng(3), model.disc
+    x = disc.vector()
+    x.array[:] = 0.4 * rng.normal(size=x.local_size)
+    model.system.set_increment(x)
+    model.remember()
+    disc.everywhere(advance_fields)
+    return tuple(
+        field.x.array.reshape(len(x.array) // 6, -1).copy()[np.argsort(disc.local_nodes)]
+        for field in (model.fields.u_n, model.fields.q_n)
+    )
+
+
+def turned(model, u, q, R, p):
+    """The state after a turn about the origin."""
+    points = model.net.points
+    return (points + u) @ R.T - points, compose(np.tile(p, (len(q), 1)), q)
+
+
+TURNS = {"60 degrees": np.r_[np.cos(np.pi / 6), np.sin(np.pi / 6) * np.array([2, -1, 2]) / 3]}
+TURNS |= {f"turn {seed}": random_rotation(np.random.default_rng(seed))[1] for seed in range(3)}
+
+
+@pytest.mark.parametrize("slip_limit", [None, 2.0], ids=["held", "slipping"])
+@pytest.mark.parametrize("crimp", [0.0, 1.3])
+@pytest.mark.parametrize("fabric", FABRICS)
+def test_no_turn_of_a_fabric_makes_a_force(tmp_path, fabric, crimp, slip_limit):
+    model = woven(tmp_path, fabric, crimp, slip_limit)
+    still = np.zeros_like(model.net.points), np.tile([1.0, 0, 0, 0], (len(model.net.points), 1))
+    for p in TURNS.values():
+        set_state(model, *turned(model, *still, matrix(p), p))
+        energies, gamma, forces = observed(model)
+        # Round-off of positions, 1e-14 mm, times EA/h of 100 N/mm.
+        np.testing.assert_allclose(forces, 0.0, atol=1e-11)
+        np.testing.assert_allclose(gamma, 0.0, atol=1e-13)
+        assert max(energies.values()) < 1e-12
+    # Strained, it takes its forces along; all that acts is within, and in balance.
+    state = strained(model)
+    energies, gamma, forces = observed(model)
+    assert energies["translation springs"] > 1.0
+    if slip_limit is not None:
+        assert np.abs(model.histories.save()["slip along the warp"]).mean() > 0.1
+    for p in TURNS.values():
+        R = matrix(p)
+        u, q = turned(model, *state, R, p)
+        set_state(model, u, q)
+        now, gamma_now, forces_now = observed(model)
+        for name, energy in energies.items():
+            assert now[name] == pytest.approx(energy, rel=1e-11), name
+        np.testing.assert_allclose(gamma_now, gamma, atol=1e-12)
+        np.testing.assert_allclose(forces_now[:, :3], forces[:, :3] @ R.T, atol=1e-10)
+        np.testing.assert_allclose(forces_now[:, 3:], forces[:, 3:], atol=1e-10)
+        moments = rotate(q, forces_now[:, 3:])
+        arms = np.cross(model.net.points + u, forces_now[:, :3])
+        np.testing.assert_allclose((arms + moments).sum(axis=0), 0.0, atol=1e-9)
+        np.testing.assert_allclose(forces_now[:, :3].sum(axis=0), 0.0, atol=1e-10)
 
 
 def shuffled(net, rng):

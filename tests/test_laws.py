@@ -21,13 +21,15 @@ from ufl import as_ufl
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.inputs.keys import documented
-from fabric_fenicsx.loop.inference.effects import FrameVariant
+from fabric_fenicsx.loop.kinds.picture_frame import PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.effects import PICTURE_FRAME_EFFECTS
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
-from fabric_fenicsx.loop.measurement.reading import FabricKeys, Measurement, PictureFrameRig, Run
+from fabric_fenicsx.loop.kinds.picture_frame.variant import FrameVariant
+from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.mechanics.laws import LAWS
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw, per_area
-from fabric_fenicsx.rigs.cases import CASES, CrossoverKeys
+from fabric_fenicsx.rigs.cases import CrossoverKeys
+from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
 from fabric_fenicsx.rigs.simulation import simulate
 from fabric_fenicsx.rigs.write_case import case_text, template
@@ -391,7 +393,7 @@ def test_every_form_of_the_loop_is_a_law_of_a_case():
 
 @every_law
 def test_the_keys_of_a_law_are_listed_and_written(law, tmp_path):
-    rows = {row.name: row for row in documented(CASES["drape"])}
+    rows = {row.name: row for row in documented(DrapeCase)}
     for one in LAWS[law].numbers().values():
         row = rows[f"crossover.laws[{law}].{one.key}"]
         assert row.description and row.allowed != "a group of keys"
@@ -407,7 +409,7 @@ def test_the_keys_of_a_law_are_listed_and_written(law, tmp_path):
 
 
 def test_units_of_the_keys_of_laws():
-    rows = {row.name: row for row in documented(CASES["drape"])}
+    rows = {row.name: row for row in documented(DrapeCase)}
     for key, unit in {
         "maxwell].cubic_1_rad2": "1/rad²",
         "maxwell].relaxation_time_s": "s",
@@ -475,10 +477,10 @@ def test_a_law_of_ones_own_in_a_case(tmp_path):
         ("tight_angle_deg: 3", "tight_angle_deg: yes", "tight_angle_deg: true, allowed is a num"),
         ("tight_angle_deg: 3", "3: 3", "a key that is no text"),
         ("ln, tanh", "ln, tan_h", "mine.py: ImportError"),
-        ("class Stitches(CrossingLaw)", "class Stitches", "none, allowed is one subclass"),
+        ("class Stitches(ff.CrossingLaw)", "class Stitches", "none, allowed is one subclass"),
         (
             "# %%\n@data",
-            "class B(CrossingLaw):\n    pass\n\n\n@data",
+            "class B(ff.CrossingLaw):\n    pass\n\n\n@data",
             "B, Stitches, allowed is one",
         ),
         ("# %%\nfrom", "1 / 0\nfrom", "mine.py: ZeroDivisionError"),

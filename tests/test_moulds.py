@@ -14,8 +14,7 @@ from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.geometry.distance import DistanceGrid, exact_distance
 from fabric_fenicsx.geometry.triangles import Triangles, read_stl, write_stl
 from fabric_fenicsx.mechanics.tools import Mould, Sphere
-from fabric_fenicsx.rigs.cases import DrapeCase
-from fabric_fenicsx.rigs.drape import tools
+from fabric_fenicsx.rigs.drape import DrapeCase, tools
 from fabric_fenicsx.solving.model import Model, Support
 from fabric_fenicsx.solving.parts import ContactLaw, CrossoverLaw
 

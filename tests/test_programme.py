@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from measurements.programmes import Frame, load_hold, sine, triangle
 
-from fabric_fenicsx.loop.kinds.picture_frame.motion import frame_programme
+from fabric_fenicsx.loop.kinds.picture_frame.motion import frame_motion
 
 FRAME = Frame()
 
@@ -14,7 +14,7 @@ def found(programme, times, digits=None):
     travel, speed = programme.drive(FRAME, times)
     if digits is not None:
         travel = np.round(travel, digits)
-    return frame_programme(times, travel, FRAME.length), speed
+    return frame_motion(times, travel, FRAME.length), speed
 
 
 def rates(p):

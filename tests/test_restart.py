@@ -12,8 +12,8 @@ import pytest
 from test_rigs import SMALL
 
 from fabric_fenicsx.rigs import drape
-from fabric_fenicsx.rigs.cases import DrapeCase
 from fabric_fenicsx.rigs.common import Session
+from fabric_fenicsx.rigs.drape import DrapeCase
 
 # Everything that remembers: friction on the tools, the height of a pushed holder, a Maxwell branch,
 # friction and slip at the crossings, the viscosity of bending.

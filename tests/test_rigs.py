@@ -14,8 +14,9 @@ import pandas as pd
 import pytest
 
 from fabric_fenicsx.rigs import drape, picture_frame
-from fabric_fenicsx.rigs.cases import DrapeCase, PictureFrameCase
 from fabric_fenicsx.rigs.common import Session
+from fabric_fenicsx.rigs.drape import DrapeCase
+from fabric_fenicsx.rigs.picture_frame import PictureFrameCase
 
 DEMOS = Path(__file__).parents[1] / "demos"
 
@@ -92,19 +93,36 @@ def test_energy_balance_of_a_small_drape(tmp_path):
 
 
 def test_quarter_and_whole_agree(tmp_path):
-    """A centred punch: the quarter with its symmetry planes is the whole sheet."""
-    angles = []
+    """A centred punch: the quarter with its symmetry planes is the whole sheet.
+
+    Its forces, works and momenta too: what a quarter records is of the whole.
+    """
+    angles, last = [], []
     for symmetry in ("quarter", "none"):
         folder = tmp_path / symmetry
         folder.mkdir()
         case = DrapeCase.model_validate({**SMALL, "symmetry": symmetry})
-        drape.run(case, session(folder))
+        result = drape.run(case, session(folder))
+        last.append(pd.read_csv(folder / "steps.csv").iloc[-1])
+        assert result["quantities"]["punch_force_N"] == pytest.approx(-last[-1]["punch_force_z_N"])
         table = pd.read_csv(folder / "crossings.csv")
         own = table[(table["x0_mm"] > 0) & (table["y0_mm"] > 0)]
         angles.append(own.sort_values(["x0_mm", "y0_mm"])["angle_deg"].to_numpy())
     assert len(angles[0]) == 36
     assert angles[0].min() < 85.0
     assert angles[1] == pytest.approx(angles[0], abs=1e-3)
+    for kinds, size in (
+        (("force", "external_force"), last[1]["punch_force_z_N"]),
+        (("work", "energy", "stored", "lost", "remainder"), last[1]["external_work_N_mm"]),
+        (("momentum",), last[1]["momentum_z_N_s"]),
+        # A sum of forces in balance up to the tolerance, 0.1 mN, over 18 s, 72 mm from the axis.
+        (("impulse", "moment"), 1e3 * 1e-4 * 18.0 * 72.0),
+    ):
+        names = [name for name in last[1].index if set(name.split("_")) & set(kinds)]
+        assert names
+        assert last[0][names].to_numpy() == pytest.approx(
+            last[1][names].to_numpy(), abs=1e-3 * abs(size)
+        )
 
 
 def command(*arguments, ranks=1):

@@ -4,7 +4,15 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from solve import GivenSection, orders, plain_net, random_rotation
+from solve import (
+    GivenSection,
+    orders,
+    plain_net,
+    raised,
+    random_rotation,
+    set_state,
+    taylor_remainders,
+)
 
 from fabric_fenicsx.rigs.cases import CrossoverKeys
 from fabric_fenicsx.rigs.common import crossover_law
@@ -106,16 +114,17 @@ def test_a_high_limit_is_no_limit():
 def test_the_key_of_a_case():
     """Per crossing, like the stiffness of the springs."""
     keys = CrossoverKeys.model_validate({"slip_limit_N": 3.0})
-    assert crossover_law(keys, 12.0, 10.0).slip_limit == 3.0
-    assert crossover_law(CrossoverKeys(), 12.0, 10.0).slip_limit is None
+    assert crossover_law(keys, 120.0).slip_limit == 3.0
+    assert crossover_law(CrossoverKeys(), 120.0).slip_limit is None
 
 
-def test_work_is_the_derivative_of_the_energy():
+@pytest.mark.parametrize("crimp", [0.0, 1.3])
+def test_work_is_the_derivative_of_the_energy(crimp):
     """Below the limit, with slip remembered: R·h = dE(w + εh)/dε, turns of the warp included.
 
     E = k |Δ − R s|²/2; a force from an energy that no rigid turn changes is balanced.
     """
-    net = plain_net(1, 1, 4.0, 2)
+    net = raised(plain_net(1, 1, 4.0, 2), crimp)
     law = CrossoverLaw(translation=K, k1=5.0, k3=2.0, dashpot=0.0, alignment=8.0, slip_limit=1e6)
     model = Model(net, SECTION, crossovers=law, comm=MPI.COMM_SELF)
     system, disc = model.system, model.disc
@@ -141,13 +150,14 @@ def test_work_is_the_derivative_of_the_energy():
     assert np.sum(model.reactions().ravel() * h) == pytest.approx(difference, rel=1e-7)
 
 
-@pytest.mark.parametrize("limit", [1e6, LIMIT])
-def test_tangent_is_the_symmetric_derivative_of_the_residual(limit):
+@pytest.mark.parametrize("crimp", [0.0, 1.3])
+@pytest.mark.parametrize("limit", [None, 1e6, LIMIT])
+def test_tangent_is_the_symmetric_derivative_of_the_residual(limit, crimp):
     """By central differences, sticking and sliding; tows without stiffness leave it alone.
 
     Cholesky reads one half of the matrix only: a tangent declared symmetric must be so.
     """
-    net = plain_net(1, 1, 4.0, 2)
+    net = raised(plain_net(1, 1, 4.0, 2), crimp)
     law = CrossoverLaw(translation=K, k1=5.0, k3=2.0, dashpot=0.0, alignment=8.0, slip_limit=limit)
     model = Model(net, GivenSection((1e-9,) * 6), crossovers=law, comm=MPI.COMM_SELF)
     system, disc = model.system, model.disc
@@ -171,3 +181,18 @@ def test_tangent_is_the_symmetric_derivative_of_the_residual(limit):
     np.testing.assert_allclose(tangent, tangent.T, atol=1e-12 * K)
     # Differences of forces of 20 N over 2e-6 have 1e-9 of round-off and 1e-11 of curvature.
     np.testing.assert_allclose(tangent, np.column_stack(columns), atol=1e-7)
+
+
+@pytest.mark.parametrize("limit", [None, LIMIT])
+def test_tangent_is_of_second_order_with_crimp_and_large_turns(limit):
+    """Taylor: R(x + εd) − R(x) − εKd falls with ε², from a turned state that sticks or slides."""
+    net = raised(plain_net(2, 2, 4.0, 1), 1.3)
+    law = CrossoverLaw(translation=K, k1=5.0, k3=2.0, dashpot=0.0, alignment=8.0, slip_limit=limit)
+    model = Model(net, GivenSection((1e-9,) * 6), crossovers=law)
+    rng, count = np.random.default_rng(7), len(net.points)
+    q = rng.normal(size=4) + 0.5 * rng.normal(size=(count, 4))
+    set_state(model, rng.normal(size=(count, 3)), q / np.linalg.norm(q, axis=1)[:, None])
+    x, d = model.disc.vector(), model.disc.vector()
+    x.array[:], d.array[:] = 0.8 * rng.normal(size=(2, x.local_size))
+    rest = taylor_remainders(model, x, d, largest=1e-3)
+    assert orders(rest) == pytest.approx(2.0, abs=0.02)

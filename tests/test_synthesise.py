@@ -11,7 +11,7 @@ import yaml
 from test_diagnose import command, report_of
 
 from fabric_fenicsx.errors import InputError
-from fabric_fenicsx.loop.inference.effects import read_effects
+from fabric_fenicsx.loop.own_effects import read_effects
 
 DEMOS = Path(__file__).parents[1] / "demos"
 CASE, OWN = DEMOS / "picture_frame.yaml", DEMOS / "own_effects.py"
@@ -173,7 +173,10 @@ def test_a_broken_file_of_effects_is_one_line(old, new, says, tmp_path, capsys):
 def test_a_list_of_effects(effects, says, tmp_path):
     """Beside laws, or instead of them, a file may have a list."""
     path = tmp_path / "mine.py"
-    head = "from fabric_fenicsx.loop.inference.effects import Effect, FrameVariant\n"
+    head = (
+        "from fabric_fenicsx.loop.inference.effects import Effect\n"
+        "from fabric_fenicsx.loop.kinds.picture_frame.variant import FrameVariant\n"
+    )
     path.write_text(f"{head}EFFECTS = {effects}\n")
     with pytest.raises(InputError, match=says):
         read_effects(path)

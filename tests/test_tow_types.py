@@ -11,8 +11,7 @@ from solve import Statics
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import WEFT
-from fabric_fenicsx.rigs.cantilever import strip
-from fabric_fenicsx.rigs.cases import CantileverCase
+from fabric_fenicsx.rigs.cantilever import CantileverCase, strip
 from fabric_fenicsx.rigs.common import Session, crossover_law, tow_net, tow_sections
 from fabric_fenicsx.rigs.load import load_case
 from fabric_fenicsx.solving.model import Model, Support
@@ -47,7 +46,7 @@ def test_each_tow_carries_what_its_section_does():
         net,
         sections,
         tow_section=kind,
-        crossovers=crossover_law(case.crossover, 12.0, 12.0),
+        crossovers=crossover_law(case.crossover, 144.0),
         supports=[
             Support(left, (0, 1, 2, 3, 4, 5)),
             Support(right, (0, 1, 2, 3, 4, 5), lambda time: time * moved),

@@ -3,6 +3,7 @@
 import importlib.util
 import sys
 from dataclasses import fields, replace
+from itertools import permutations
 from math import cos, inf, radians, sin, sqrt
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from pydantic import ValidationError
 from scipy.integrate import quad
 
 from fabric_fenicsx.errors import InputError
+from fabric_fenicsx.fabric.chains import net_from_lines
 from fabric_fenicsx.fabric.crossings import (
     areas,
     crossing_numbers,
@@ -35,8 +37,7 @@ from fabric_fenicsx.fabric.weave import (
     satin,
     twill,
 )
-from fabric_fenicsx.rigs.cases import SheetKeys
-from fabric_fenicsx.rigs.weave_keys import WeaveKeys, crossing_weights, layout, pattern
+from fabric_fenicsx.rigs.weave_keys import SheetKeys, WeaveKeys, crossing_weights, layout, pattern
 
 pytest.importorskip("gmsh")
 
@@ -307,6 +308,63 @@ def test_the_reference_angle_is_odd_and_zero_at_right_angles(tmp_path):
         tows = spaced_layout(Circle(20.0), warp_angle=warp, weft_angle=weft, **common)
         got = np.degrees(reference_angle(net_of(tows, tmp_path)))
         np.testing.assert_allclose(got, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.0, 90.0, 180.0, -90.0])
+@pytest.mark.parametrize(
+    ("warp", "weft"), [(90, 0), (0, 90), (45, -45), (60, -60), (30, -30), (90, 30), (150, 90)]
+)
+def test_a_turned_layout_is_the_layout_turned(tmp_path, warp, weft, turn):
+    """Warp and weft exchanged, too: places turn, and angles and areas stay at their crossings."""
+    common = {"warp_spacing": 5.0, "weft_spacing": 4.0}
+    nets = [
+        net_of(spaced_layout(Circle(23.0), warp_angle=a, weft_angle=b, **common), tmp_path)
+        for a, b in ((warp, weft), (warp + turn, weft + turn))
+    ]
+    c, s = round(cos(radians(turn))), round(sin(radians(turn)))
+    found = []
+    for net, back in zip(nets, (np.eye(2), np.array([[c, -s], [s, c]])), strict=True):
+        at = net.points[net.crossings[:, 0], :2] @ back
+        columns = [at, areas(net)[:, None], reference_angle(net)[:, None]]
+        found.append(np.hstack(columns)[np.lexsort(np.round(at, 6).T)])
+    np.testing.assert_allclose(found[1], found[0], atol=1e-9)
+    # As the tows are lines without a direction, from weft to warp is up to 180 degrees.
+    assert (np.abs(found[0][:, 3]) <= radians(75.0)).all()
+
+
+def test_a_turned_weave_is_the_weave_turned(tmp_path):
+    """The same tow lies on top of each crossing when warp and weft are exchanged by a turn."""
+    common = {"warp_spacing": 5.0, "weft_spacing": 4.0, "crimp": 0.3}
+    tops = []
+    for warp, weft in ((90.0, 0.0), (180.0, 90.0)):
+        tows = spaced_layout(
+            rectangle((-20, 20), (-20, 20)),
+            warp_angle=warp,
+            weft_angle=weft,
+            pattern=WEAVES["twill_3_1"],
+            **common,
+        )
+        net = net_of(tows, tmp_path, 0.3)
+        x, y, z = net.points[net.crossings[:, 0]].T
+        if warp == 180.0:
+            x, y = y, -x
+        tops.append(z[np.lexsort(np.round([x, y], 6))])
+        np.testing.assert_array_equal(
+            WEAVES["twill_3_1"].over(*crossing_numbers(net)), net.points[net.crossings[:, 0], 2] > 0
+        )
+    np.testing.assert_array_equal(*tops)
+
+
+@pytest.mark.parametrize("axes", list(permutations(range(3))))
+def test_a_mesh_turned_onto_other_axes_has_right_angles(axes):
+    """Flat or upright, warp and weft along whatever axes: shear is counted from 0, not from 180."""
+    x, y = np.meshgrid(np.arange(4.0), 2.0 * np.arange(3.0), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])[:, axes]
+    number = np.arange(x.size).reshape(x.shape)
+    warp = np.column_stack([number[:, :-1].ravel(), number[:, 1:].ravel()])
+    weft = np.column_stack([number[:-1].ravel(), number[1:].ravel()])
+    net, _ = net_from_lines(points, warp, weft)
+    np.testing.assert_allclose(reference_angle(net), 0.0, atol=1e-12)
 
 
 def test_an_axis_has_no_direction():

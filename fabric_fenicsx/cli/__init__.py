@@ -4,7 +4,8 @@ A further command is a function in a module of its own, registered in `app.py`; 
 imports inside, and what it does on several ranks inside `collective`.
 """
 
+from ..parallel import from_root
 from .app import app
-from .collective import collective, from_root
+from .collective import collective
 
 __all__ = ["app", "collective", "from_root"]

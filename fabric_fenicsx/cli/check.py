@@ -42,6 +42,9 @@ def check(
         table.add_row(name, *map(str, counts), str(6 * len(net.points)))
     console.print(table)
     cost = estimate(loaded, list(nets.values()))
+    if cost is None:
+        console.print(f"no estimate of steps and time: {loaded.test} gives no figures for one")
+        return
     console.print(
         f"about {cost.steps} steps, {cost.iterations} iterations and {_time(cost.seconds)} on one "
         "core; rough, by a factor of three either way. Forms that were never compiled here take "
@@ -52,25 +55,16 @@ def check(
 
 def _nets(case: Case, base: Path) -> dict[str, Net]:
     """The nets of a case by name; files that it names are read."""
-    from tempfile import TemporaryDirectory
+    from ..fabric.gmsh_io import mesh_net, read_msh
+    from ..rigs.registry import rig
 
-    from ..fabric.gmsh_io import read_msh, write_msh
-    from ..rigs.fabrics import crossing_gap, fabrics
-
-    if (shape := getattr(case, "punch_stl", None)) is not None:
-        from ..geometry.triangles import read_stl
-
-        read_stl(base / shape)
-    gap = crossing_gap(case)
+    found = rig(case.test)
+    found.read_files(case, base)
+    gap = found.crossing_gap(case)
     if case.mesh is not None:
         return {case.mesh: read_msh(base / case.mesh, crossing_gap=gap)}
-    nets = {}
-    with TemporaryDirectory() as folder:
-        for name, fabric in fabrics(case, base).items():
-            path = Path(folder) / "tows.msh"
-            write_msh(fabric, path)
-            nets[name] = read_msh(path, crossing_gap=gap)
-    return nets
+    fabrics = found.fabrics(case, base)
+    return {name: mesh_net(fabric, crossing_gap=gap) for name, fabric in fabrics.items()}
 
 
 def _time(seconds: float) -> str:

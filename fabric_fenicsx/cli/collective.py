@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import InputError, SolveError
 from ..parallel import rank
 
-__all__ = ["collective", "from_root", "say"]
+__all__ = ["collective", "say"]
 
 PATIENCE = 30.0
 """Seconds that a rank with bad input waits for the others to find it bad as well."""
@@ -76,21 +76,6 @@ def _told(error: BaseException, folder: Path | None) -> tuple[int, str]:
         return SolveError.exit_code, f"stopped: {what} ({reason}); {kept}"
     assert isinstance(error, (InputError, SolveError))
     return error.exit_code, " ".join(str(error).split())
-
-
-def from_root(comm: Any, load: Callable[[], Any]) -> Any:
-    """What rank 0 alone reads or does, on every rank; its errors as well. Collective."""
-    value: Any = None
-    problem: InputError | SolveError | None = None
-    if comm.rank == 0:
-        try:
-            value = load()
-        except (InputError, SolveError) as error:
-            problem = error
-    value, problem = comm.bcast((value, problem))
-    if problem is not None:
-        raise problem
-    return value
 
 
 def _all_come(guard: Any, seconds: float) -> bool:

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import InputError
-from .collective import say
+from .results import listed
 
 __all__ = ["keys"]
 
@@ -19,19 +18,19 @@ def keys(
     markdown: Annotated[bool, typer.Option("--markdown", help="As tables in Markdown.")] = False,
 ) -> None:
     """Print the keys of a case file with unit, default and what is allowed."""
-    from ..inputs.keys import documented, one_of
-    from ..rigs.cases import CASES
+    from ..inputs.keys import documented
+    from ..rigs import registry
 
-    if rig is not None and rig not in CASES:
-        say(f"keys: {rig}, allowed is {one_of(list(CASES))}")
-        raise typer.Exit(InputError.exit_code)
+    if rig is not None:
+        listed("keys", rig, registry.RIGS)
     headings = ("key", "unit", "default", "allowed", "meaning")
-    for name in [rig] if rig else list(CASES):
+    for name in [rig] if rig else registry.RIGS:
+        case = registry.rig(name).case
         rows: list[tuple[str, ...]] = [
             (key.name, key.unit, key.default, key.allowed, key.description)
-            for key in documented(CASES[name])
+            for key in documented(case)
         ]
-        text = " ".join((CASES[name].__doc__ or "").split())
+        text = " ".join((case.__doc__ or "").split())
         if markdown:
             _print_markdown(name, text, headings, rows)
         else:

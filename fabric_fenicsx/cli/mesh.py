@@ -27,27 +27,29 @@ def mesh(
 ) -> None:
     """Write the tows of a case as a gmsh mesh and draw them.
 
-    The mesh can be changed with gmsh and be named in a case as `mesh:`. Of a cantilever the longest
-    specimen is written.
+    The mesh can be changed with gmsh and be named in a case as `mesh:`. Of several specimens
+    the largest is written.
     """
     from ..fabric.gmsh_io import read_msh, write_msh
     from ..output.weaves import draw_weave
-    from ..rigs.fabrics import crossing_gap, fabrics
     from ..rigs.load import load_case
+    from ..rigs.registry import rig
 
     loaded = load_case(case, settings or [])
     if loaded.mesh is not None:
         raise InputError(f"{case}: mesh: the case has one, {loaded.mesh}; allowed is a sheet")
     path = writable(out or Path(case.stem + ".msh"), (".msh",))
-    fabric = list(fabrics(loaded, case.parent).values())[-1]
+    found = rig(loaded.test)
+    gap = found.crossing_gap(loaded)
+    fabric = list(found.fabrics(loaded, case.parent).values())[-1]
     write_msh(fabric, path)
-    net = read_msh(path, crossing_gap=crossing_gap(loaded))
+    net = read_msh(path, crossing_gap=gap)
     print(
         f"{path}: {len(net.tow_family)} tows, {len(net.cells)} cells, "
         f"{len(net.crossings)} crossings"
     )
     if not no_picture:
         picture = path.with_suffix(".png")
-        thickness = max(crossing_gap(loaded), loaded.tow.height_mm)
+        thickness = max(gap, loaded.tow.height_mm)
         draw_weave(picture, net, width=loaded.tow.width_mm, thickness=thickness)
         print(picture)

@@ -8,13 +8,14 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
+from ..rigs.registry import RIGS
 from .results import listed, writable
 
 __all__ = ["new"]
 
 
 def new(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="drape, picture_frame or cantilever.")],
+    rig: Annotated[str, typer.Argument(metavar="RIG", help=f"One of {', '.join(RIGS)}.")],
     out: Annotated[
         Path | None,
         typer.Argument(metavar="[FILE.yaml]", help="Default: RIG.yaml here. It must not exist."),
@@ -22,10 +23,9 @@ def new(
 ) -> None:
     """Write a commented case file: every key at its default, with unit and what is allowed."""
     from ..output.files import write_text
-    from ..rigs.cases import CASES
     from ..rigs.write_case import template
 
-    listed("new", rig, CASES)
+    listed("new", rig, RIGS)
     path = out or Path(f"{rig}.yaml")
     if path.exists():
         raise InputError(f"{path}: exists, allowed is a new file")

@@ -57,12 +57,13 @@ def opened(folder: Path, mirror: bool | None) -> tuple[Results, bool, str]:
     """
     from ..output.results import read_results
     from ..rigs.load import load_case
+    from ..rigs.registry import rig
 
     results = read_results(folder)
     path = folder / "case.yaml"
     case = load_case(path) if path.exists() else None
     if mirror is None:
-        mirror = getattr(case, "symmetry", "none") == "quarter"
+        mirror = case is not None and rig(case.test).quarter(case)
     return results, mirror, (case.title if case is not None else "") or folder.name
 
 

@@ -9,7 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import SolveError
-from .collective import collective, from_root, say
+from ..parallel import from_root
+from .collective import collective, say
 
 __all__ = ["run"]
 
@@ -62,20 +63,22 @@ def _run(
 
     case = from_root(comm, lambda: load_case(path, settings))
 
-    from ..output.record import prepare_folder, write_result
-    from ..rigs.common import Session
-    from ..rigs.registry import RUNNERS
-    from ..rigs.write_case import case_text
+    from ..rigs.run import run
     from ..terminal import following, summarise
 
-    prepare_folder(folder, comm)
     root = comm.rank == 0
     with following(quiet=quiet or not root) as progress:
-        session = Session(folder, comm, path.parent, started, progress, resume, pictures)
-        session.case_text = case_text(case, path.parent)
-        result = RUNNERS[case.test](case, session)
+        result = run(
+            case,
+            folder,
+            base=path.parent,
+            resume=resume,
+            pictures=pictures,
+            progress=progress,
+            started=started,
+            comm=comm,
+        )
     if root:
-        write_result(folder, result)
         if not quiet:
             summarise(result, folder)
         if not result["completed"]:

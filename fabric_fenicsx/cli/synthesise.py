@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InputError
-from .collective import collective, from_root
+from ..parallel import from_root
+from .collective import collective
 
 if TYPE_CHECKING:
-    from ..loop.synthesise import Hidden
-    from ..rigs.cases import Case
+    from ..loop.synthesise import Case, Hidden
 
 __all__ = ["synthesise"]
 
@@ -60,12 +61,12 @@ def synthesise(
     folder = out if out is not None else Path("results") / f"measured_{case.stem}"
 
     def action(comm: Any) -> int:
-        from ..loop.registry import experiment_class
         from ..rigs.load import load_case
 
         loaded = from_root(comm, lambda: load_case(case))
-        # On every rank: PETSc starts up in all processes at once.
-        experiment_class(loaded.test)
+        if comm.size > 1:
+            # It starts up in all processes at once, and rank 0 alone will need it.
+            import_module("petsc4py.PETSc")
         put_in = from_root(
             comm,
             lambda: _write(
@@ -102,14 +103,21 @@ def _write(
     effects_from: Path | None,
 ) -> list[Hidden]:
     from ..loop import synthesise as loop
-    from ..loop.inference.effects import read_effects
+    from ..loop.own_effects import read_effects
 
     if not 0.0 < noise < float("inf"):
         raise InputError(f"--noise: {noise:g}, allowed is more than 0")
     hidden = [loop.parse_effect(text) for text in effects]
     own = read_effects(effects_from) if effects_from is not None else []
     made = loop.synthesise(
-        case, hidden, noise, seed=seed, rates=rates, readings=readings, own=own, place=str(path)
+        case,
+        hidden,
+        noise,
+        seed=seed,
+        readings=readings,
+        own=own,
+        place=str(path),
+        **({"rates": rates} if rates else {}),
     )
     try:
         loop.write_measurement(folder, made)

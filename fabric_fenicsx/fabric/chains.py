@@ -22,6 +22,9 @@ CROSSING_TOLERANCE = 1e-3
 SAME_PLACE = 1e-6
 """Part of a length below which a component or a distance counts as nothing."""
 
+CLEAR = 0.1
+"""A family points along its axis if more than this of a unit vector does."""
+
 NAMES = {WARP: "warp", WEFT: "weft"}
 OWN_AXIS = {WARP: 1, WEFT: 0}
 Z, Y, X = 2, 1, 0
@@ -36,7 +39,8 @@ def net_from_lines(
     """Build the net of the tows that line cells form.
 
     The cells of a family must form open chains. Warp tows are directed towards +y and weft tows
-    towards +x; a family that lies across its axis is directed along its main one. Tows are
+    towards +x; a family that lies across its axis is directed along its main one, or against it
+    where otherwise the warp would not lie to the left of the weft, seen from above. Tows are
     numbered warp first, by the place of their middle, and nodes along the tows. A node that a
     warp and a weft cell share becomes two.
 
@@ -56,7 +60,9 @@ def net_from_lines(
     Raises:
         ValueError: the cells do not form tows that cross; says which group and where.
     """
-    parts = [_tows(points, lines, family) for family, lines in ((WARP, warp), (WEFT, weft))]
+    parts = _warp_left_of_weft(
+        points, [_tows(points, lines, family) for family, lines in ((WARP, warp), (WEFT, weft))]
+    )
     source = np.concatenate([nodes for nodes, _ in parts])
     counts = np.concatenate([count for _, count in parts])
     family = np.repeat([WARP, WEFT], [len(count) for _, count in parts])
@@ -135,11 +141,34 @@ def _tows(points: Floats, lines: Integers, family: int) -> tuple[Integers, Integ
     return nodes[along], np.bincount(rank[tow])
 
 
-def _direction(chords: Floats, own: int) -> Floats:
-    """+1 or -1 for each chord: whether it goes the way of its family."""
+def _warp_left_of_weft(
+    points: Floats, parts: list[tuple[Integers, Integers]]
+) -> list[tuple[Integers, Integers]]:
+    """The tows of both families; one that lies across its axis may be turned round."""
+    chords = []
+    for nodes, counts in parts:
+        last = np.cumsum(counts) - 1
+        chords.append(points[nodes[last]] - points[nodes[last - counts + 1]])
+    across = [f for f in (WARP, WEFT) if _lean(chords[f])[OWN_AXIS[f]] <= CLEAR]
+    t, s = (c.mean(axis=0) / np.linalg.norm(c, axis=1).mean() for c in chords)
+    if across and _upwards(np.cross(s, t)[None]) < 0.0:
+        nodes, counts = parts[across[0]]
+        tows = np.split(nodes, np.cumsum(counts)[:-1])
+        parts[across[0]] = np.concatenate([tow[::-1] for tow in tows]), counts
+    return parts
+
+
+def _lean(chords: Floats) -> Floats:
+    """How much of the chords' directions lies along each axis, on the mean."""
     lengths = np.linalg.norm(chords, axis=1)
     lean: Floats = np.round((np.abs(chords) / lengths[:, None]).mean(axis=0), 6)
-    axis = own if lean[own] > 0.1 else int(np.argmax(lean))
+    return lean
+
+
+def _direction(chords: Floats, own: int) -> Floats:
+    """+1 or -1 for each chord: whether it goes the way of its family."""
+    lengths, lean = np.linalg.norm(chords, axis=1), _lean(chords)
+    axis = own if lean[own] > CLEAR else int(np.argmax(lean))
     signs = np.zeros(len(chords))
     for k in (axis, *(other for other in (X, Y, Z) if other != axis)):
         decided = (signs != 0) | (np.abs(chords[:, k]) <= SAME_PLACE * lengths)

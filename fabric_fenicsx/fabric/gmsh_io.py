@@ -13,6 +13,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from fabric_fenicsx.fabric.chains import net_from_lines, place
 from fabric_fenicsx.fabric.net import WARP, WEFT, Net
 from fabric_fenicsx.fabric.paths import TowPaths
 
-__all__ = ["GROUPS", "read_msh", "write_msh"]
+__all__ = ["GROUPS", "mesh_net", "read_msh", "write_msh"]
 
 GROUPS = {"warp": 1, "weft": 1, "tow_ends": 0}
 """Physical groups of a tow mesh and their dimensions."""
@@ -151,6 +152,25 @@ def read_msh(path: str | Path, *, crossing_gap: float = 0.0) -> Net:
                 f"the ends of all tows, {len(ends)} points, and no others are allowed"
             )
     return net
+
+
+def mesh_net(fabric: TowPaths, *, crossing_gap: float = 0.0) -> Net:
+    """The net of a fabric, meshed by gmsh.
+
+    Args:
+        fabric: its tows.
+        crossing_gap: as of `read_msh`.
+
+    Raises:
+        InputError: there is no such net.
+    """
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "tows.msh"
+        try:
+            write_msh(fabric, path)
+        except ValueError as error:
+            raise InputError(str(error)) from None
+        return read_msh(path, crossing_gap=crossing_gap)
 
 
 def _check_header(path: Path) -> None:

@@ -16,21 +16,19 @@ import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from .chains import CLEAR
 from .net import WARP, WEFT
 from .outline import Outline
 from .paths import ROUNDING, TowPath, check_size, divide
 from .weave import PLAIN, WeavePattern
 
-__all__ = ["TowFamily", "TowLayout", "across", "along", "spaced_layout"]
+__all__ = ["TowFamily", "TowLayout", "spaced_layout"]
 
 SHORTEST_END = 0.1
 """A tow ends on its last crossing where less than this part of a cell would lie beyond it."""
 
 FLATTEST = 15.0
 """Smallest angle between warp and weft [degrees]."""
-
-CLEAR = 0.1
-"""A tow points along its family's axis, +y or +x, if this much of a unit vector does."""
 
 Floats = npt.NDArray[np.float64]
 
@@ -106,7 +104,7 @@ class TowLayout:
             raise ValueError(f"tows: subdivisions is {self.subdivisions}; at least 1 is needed")
         if not (isfinite(self.crimp) and self.crimp >= 0.0):
             raise ValueError(f"tows: crimp is {self.crimp}; a length from 0 mm is needed")
-        t, s = along(WARP, self.warp.angle), along(WEFT, self.weft.angle)
+        t, s = self._directions()
         between = degrees(np.arctan2(s[0] * t[1] - s[1] * t[0], s @ t))
         if not FLATTEST - 1e-9 <= between <= 180.0 - FLATTEST + 1e-9:
             raise ValueError(
@@ -121,6 +119,9 @@ class TowLayout:
         """The tows of WARP or WEFT."""
         return self.warp if family == WARP else self.weft
 
+    def _directions(self) -> tuple[Floats, Floats]:
+        return _directions(self.warp.angle, self.weft.angle)
+
     def tows(self, family: int) -> list[TowPath]:
         """Paths of the tows of WARP or WEFT.
 
@@ -129,8 +130,8 @@ class TowLayout:
         """
         pieces, crossings = self._connected()
         number = _numbers(pieces)
-        direction = along(family, self.family(family).angle)
-        side = across(family, self.family(family).angle)
+        direction = self._directions()[family]
+        side = _across(family, direction)
         met: dict[int, list[tuple[float, Floats, float]]] = {}
         for (warp, weft), at in crossings.items():
             over = self.pattern.over(number[warp], number[weft])
@@ -173,8 +174,8 @@ class TowLayout:
         positions = self.family(1 - piece.family).positions
         if len(positions) == 1:
             return piece.high - piece.low
-        t, a = along(WARP, self.warp.angle), across(WEFT, self.weft.angle)
-        return float(np.ptp(positions) / (len(positions) - 1) / abs(t @ a))
+        t, s = self._directions()
+        return float(np.ptp(positions) / (len(positions) - 1) / abs(t @ _across(WEFT, s)))
 
     def _connected(self) -> tuple[list[_Piece], dict[tuple[int, int], Floats]]:
         """The pieces that hang together, and where two of them, a warp and a weft one, cross."""
@@ -196,7 +197,8 @@ class TowLayout:
     def _cut(self, family: int) -> list[_Piece]:
         """Pieces of the family's lines inside the outline, in order."""
         tows = self.family(family)
-        direction, side = along(family, tows.angle), across(family, tows.angle)
+        direction = self._directions()[family]
+        side = _across(family, direction)
         pieces = []
         for line, position in enumerate(tows.positions):
             for a, b in self.outline.chords(position * side, direction):
@@ -211,8 +213,8 @@ class TowLayout:
 
     def _crossings(self, pieces: Sequence[_Piece]) -> dict[tuple[int, int], Floats]:
         """Where warp pieces cross weft pieces [mm], by their places in the list."""
-        t, a = along(WARP, self.warp.angle), across(WARP, self.warp.angle)
-        s, b = along(WEFT, self.weft.angle), across(WEFT, self.weft.angle)
+        t, s = self._directions()
+        a, b = _across(WARP, t), _across(WEFT, s)
         rounding = ROUNDING * max(piece.high - piece.low for piece in pieces) if pieces else 0.0
         of_line: dict[tuple[int, int], list[int]] = {}
         for k, piece in enumerate(pieces):
@@ -238,7 +240,8 @@ class TowLayout:
     def _refuse_asymmetry(self) -> None:
         for family, wanted in ((WARP, (0.0, 1.0)), (WEFT, (1.0, 0.0))):
             tows = self.family(family)
-            direction, side = along(family, tows.angle), across(family, tows.angle)
+            direction = self._directions()[family]
+            side = _across(family, direction)
             if not np.array_equal(direction, wanted):
                 raise ValueError("tows: a quarter needs warp at 90 and weft at 0 degrees")
             at = np.array(tows.positions)
@@ -258,23 +261,32 @@ class TowLayout:
                         raise ValueError("tows: a quarter needs an outline symmetric about x and y")
 
 
-def along(family: int, angle: float) -> Floats:
-    """Unit vector of the tows of WARP or WEFT at an angle [degrees], shape (2,).
+def _directions(warp_angle: float, weft_angle: float) -> tuple[Floats, Floats]:
+    """Unit vectors of the tows of WARP and of WEFT at angles [degrees], each of shape (2,).
 
-    A warp tow points towards +y and a weft tow towards +x, however its angle is given; one that
-    hardly does, towards the other axis (the rule by which a mesh's tows are directed, too).
+    A warp tow points towards +y and a weft tow towards +x, however its angle is given. One that
+    hardly does points so that the warp lies to the left of the weft, as shear is counted; of two
+    such, the weft points towards +y. (The rule by which a mesh's tows are directed, too.)
     """
-    t = np.array([cos(radians(angle)), sin(radians(angle))])
-    t[np.abs(t) < 1e-15] = 0.0  # exact along the axes
-    t /= np.linalg.norm(t)
-    own = 1 if family == WARP else 0
-    axis = own if abs(t[own]) > CLEAR else 1 - own
-    return t * np.sign(t[axis]) + 0.0
+    t, s = (np.array([cos(a), sin(a)]) for a in (radians(warp_angle), radians(weft_angle)))
+    for unit in (t, s):
+        unit[np.abs(unit) < 1e-15] = 0.0  # exact along the axes
+        unit /= np.linalg.norm(unit)
+    warp_clear, weft_clear = abs(t[1]) > CLEAR, abs(s[0]) > CLEAR
+    if warp_clear:
+        t *= np.sign(t[1])
+    s *= np.sign(s[0] if weft_clear else s[1])
+    if s[0] * t[1] < s[1] * t[0]:
+        if not warp_clear:
+            t = -t
+        elif not weft_clear:
+            s = -s
+    return t + 0.0, s + 0.0
 
 
-def across(family: int, angle: float) -> Floats:
+def _across(family: int, direction: Floats) -> Floats:
     """Unit vector to the right of a warp tow, to the left of a weft tow, shape (2,)."""
-    x, y = along(family, angle)
+    x, y = direction
     return np.array([y, -x] if family == WARP else [-y, x]) + 0.0
 
 
@@ -320,7 +332,8 @@ def spaced_layout(
         gaps = np.atleast_1d(np.array(spacing, dtype=np.float64))
         if not gaps.size or not (np.isfinite(gaps) & (gaps > 0.0)).all():
             raise ValueError(f"tows: {name} spacing is {spacing}; lengths above 0 mm are needed")
-        given.append((name, angle, spacing, gaps, outline.extent(across(family, angle))))
+        side = _across(family, _directions(warp_angle, weft_angle)[family])
+        given.append((name, angle, spacing, gaps, outline.extent(side)))
     widths = [(high - low, float(gaps.mean())) for _, _, _, gaps, (low, high) in given]
     check_size(widths[0], widths[1], subdivisions)
     families: list[TowFamily] = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -13,7 +13,17 @@ from pydantic import BaseModel, ValidationError
 from ..errors import InputError
 from .keys import allowed, allowed_by, group_of, one_of, plain, variants
 
-__all__ = ["Place", "dotted_place", "mistakes", "one_line", "parse_yaml", "read_yaml", "suggestion"]
+__all__ = [
+    "Place",
+    "dotted_place",
+    "mistakes",
+    "one_line",
+    "parse_yaml",
+    "read_keys",
+    "read_yaml",
+    "refuse_devices",
+    "suggestion",
+]
 
 Place = tuple[str | int, ...]
 
@@ -60,6 +70,49 @@ def read_yaml(path: Path, what: str) -> Any:
             f"{path}: cannot be read ({error.strerror}), allowed is {what} (YAML)"
         ) from None
     return parse_yaml(text, str(path), places=True)
+
+
+def refuse_devices(path: Path) -> None:
+    """A pipe or a device may never end.
+
+    Raises:
+        InputError: it is one.
+    """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(f"{path}: is a pipe or a device, allowed is a file")
+
+
+def read_keys(
+    path: Path, what: str, schema: str, tag: str, models: Mapping[str, type[BaseModel]]
+) -> Any:
+    """Read a YAML file of a schema, whose other keys depend on one of them, and check it.
+
+    Args:
+        path: the file.
+        what: what such a file is, for the message.
+        schema: that its key ``schema`` has to name.
+        tag: the key that the others depend on.
+        models: of the keys, by the values of that one.
+
+    Raises:
+        InputError: one line that names the file, the key and what is allowed.
+    """
+    refuse_devices(path)
+    data = read_yaml(path, what)
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: {plain(data)}, allowed is a mapping of keys")
+    # Before all else: with another schema or tag every other key may rightly differ.
+    for key, allowed_here in (("schema", [schema]), (tag, list(models))):
+        value = data.get(key)
+        if value not in allowed_here:
+            close = suggestion(value, allowed_here) if isinstance(value, str) else ""
+            shown = f"{plain(value)}{close}" if key in data else "missing"
+            raise InputError(one_line(f"{path}: {key}: {shown}, allowed is {one_of(allowed_here)}"))
+    keys, found = mistakes(models[data[tag]], data)
+    if found:
+        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+        raise InputError(one_line(f"{path}: {found[0][1]}{more}"))
+    return keys
 
 
 def parse_yaml(text: str, origin: str, *, places: bool) -> Any:

@@ -2,7 +2,7 @@
 
     Γ = Λᵀ r′ − E1,          K = axial(Λᵀ Λ′)                            (strains)
     (N, M) = C (Γ, K)                                                    (section)
-    M += C_K τ (K − K_n)/Δt                                              (viscosity, optional)
+    M += C_K τ K̇,   K̇ = c (K − K*)                                       (viscosity, optional)
     R(w; v) = ∫ (N, M) · δ(Γ, K) ds                                      (virtual work)
 
 Λ = [d1 d2 d3] holds the directors: d1 along the tow, d2 across it in the sheet, d3 the normal.
@@ -86,11 +86,11 @@ def viscous_section(per_time: Any) -> SectionLaw:
     shrinks. Stretch and transverse shear stay elastic.
 
     Args:
-        per_time: relaxation time over step length, τ/Δt [-]; zero gives the elastic law.
+        per_time: τ times the factor c of the rate c (K − K*) [-]; zero gives the elastic law.
     """
 
     def law(fields: TowFields, e: Any) -> Any:
-        rate = [per_time * (e[i] - fields.strain_n[i]) if i > 2 else 0 for i in range(6)]
+        rate = [per_time * (e[i] - fields.strain_star[i]) if i > 2 else 0 for i in range(6)]
         return as_vector([fields.stiffness[i] * (e[i] + rate[i]) for i in range(6)])
 
     return law
@@ -233,16 +233,19 @@ def strain_energy(
 
 
 def viscous_loss(fields: TowFields, per_time: Any, at_zero: SectionLaw = linear_section) -> Any:
-    """Energy that the viscosity takes over a step [N mm], ∫ C τ/Δt (K − K_n) · (K − K_n) ds.
+    """Energy that the viscosity takes over a step [N mm], ∫ C τ K̇ · (K − K_n) ds.
 
     Args:
         fields: of the tows.
-        per_time: τ/Δt [-].
+        per_time: τ times the factor c of the rate c (K − K*) [-].
         at_zero: the section law linearised at zero strain, C.
     """
     e = strain(fields)
-    change = as_vector([e[i] - fields.strain_n[i] if i > 2 else 0 for i in range(6)])
-    return per_time * inner(at_zero(fields, change), change) * fields.middle
+    rate, change = (
+        as_vector([e[i] - past[i] if i > 2 else 0 for i in range(6)])
+        for past in (fields.strain_star, fields.strain_n)
+    )
+    return per_time * inner(at_zero(fields, rate), change) * fields.middle
 
 
 def beam_tangent(fields: TowFields, law: SectionLaw = linear_section) -> Any:

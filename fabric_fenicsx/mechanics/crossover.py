@@ -4,7 +4,7 @@ Three translational springs, in-plane moments M(γ, γ̇, ...) from mechanics.la
 that keeps the two sheet normals aligned: with the in-plane spring alone a tow could spin freely
 about its own axis.
 
-    F = k Δ                       translational springs, the same k in x, y and z
+    F = k Δ                       translational springs, the same k in x, y and z; mechanics.gap
     R = M δγ                      springs, dashpots and friction in the plane
     ψ = k_a (1 − n_warp · n_weft) alignment of the normals
 
@@ -23,9 +23,10 @@ from ufl import TestFunction, diff, sqrt
 
 from .._dolfinx import atan2
 from .fields import ConnectorFields, rotation_part
+from .gap import gap
 from .rotations import rotate
 from .terms import Term
-from .variations import Varied, add, cross, dot, product, root, times, turned
+from .variations import Jet, add, cross, dot, product, root, times, turned
 
 __all__ = [
     "alignment_term",
@@ -50,7 +51,7 @@ def shear_angle(fields: ConnectorFields, w: Any) -> Any:
     return atan2(Y, X) - fields.angle_0
 
 
-def shear_angle_change(fields: ConnectorFields) -> Varied:
+def shear_angle_change(fields: ConnectorFields) -> Jet:
     """The shear angle at the increment w with its derivatives in the nodes' turns."""
     (t_warp, n_warp), (t_weft, n_weft) = _turned(
         fields, (fields.warp, fields.normal), (fields.weft, fields.normal)
@@ -69,12 +70,12 @@ def shear_angle_change(fields: ConnectorFields) -> Varied:
         - first[j] * growth[i]
         for i, j in X.second
     }
-    return Varied(shear_angle(fields, fields.w), first, second)
+    return Jet(shear_angle(fields, fields.w), first, second)
 
 
 def _turned(
     fields: ConnectorFields, of_warp: tuple[Any, ...], of_weft: tuple[Any, ...]
-) -> tuple[list[Varied], list[Varied]]:
+) -> tuple[list[Jet], list[Jet]]:
     """Vectors that turn with the warp node, and those that turn with the weft node."""
     thetas = [rotation_part(w) for w in fields.ends(fields.w)]
     warp, weft = (
@@ -104,8 +105,8 @@ def _forms(
 
 def opening_energy(fields: ConnectorFields, k: Any) -> Any:
     """Energy of the three translational springs of stiffness k [N/mm]."""
-    gap = fields.gap(fields.w)
-    return k * ufl.dot(gap, gap) / 2 * fields.point
+    Delta = gap(fields, fields.w)
+    return k * ufl.dot(Delta, Delta) / 2 * fields.point
 
 
 def turning_term(
@@ -113,7 +114,7 @@ def turning_term(
     fields: ConnectorFields,
     moment: Any,
     angle: Any,
-    change: Varied,
+    change: Jet,
     *,
     share: Any,
     energy: Any = None,

@@ -77,7 +77,8 @@ class TowFields(Fields):
             (EA, κGA, κGA, GJ, E I_out, E I_in) [N, N mm²].
         mass: mass [tonne/mm] and rotary inertia about the three directors [tonne mm].
         section_forces: (N, M) [N, N mm] that the tangent's geometric part uses.
-        strain_n: (Γ, K) [-, 1/mm] at the start of the step.
+        strain_n, strain_before: (Γ, K) [-, 1/mm] at the start of the step and of the one before.
+        strain_star: what the rate of strain counts from, so that it is c (e − e*).
         rate_star, acceleration_star: the parts of velocity and acceleration known before the
             step, so that v = c_1 w + v*, a = c_0 w + a*.
     """
@@ -87,6 +88,8 @@ class TowFields(Fields):
     mass: Any
     section_forces: Any
     strain_n: Any
+    strain_before: Any
+    strain_star: Any
     rate_star: Any
     acceleration_star: Any
 
@@ -145,6 +148,8 @@ class ConnectorFields(Fields):
         interlacing: share of the in-plane moments that acts at a crossing [-] where they are due to
             how the tows float over each other; 1 in a plain weave.
         patch: share of the others, which differs from 1 where a crossing stands for another area.
+        offset: vector from the warp node to the weft node before deformation [mm]; None where it is
+            zero at every crossing of the net.
     """
 
     warp: Any
@@ -153,6 +158,7 @@ class ConnectorFields(Fields):
     angle_0: Any
     interlacing: Any
     patch: Any
+    offset: Any | None
 
     @property
     def point(self) -> Any:
@@ -163,10 +169,6 @@ class ConnectorFields(Fields):
         """Values at the warp node and at the weft node."""
         half = f.dx(0) / 2
         return f - half, f + half
-
-    def gap(self, w: Any) -> Any:
-        """Vector from the warp node to the weft node that has opened since the start [mm]."""
-        return self.u_n.dx(0) + translation_part(w.dx(0))
 
     def rotations(self, w: Any) -> tuple[Any, Any]:
         """Unit quaternions of the warp node and of the weft node after the increment w."""

@@ -12,6 +12,7 @@ from ufl import as_vector, cross, dot, sqrt
 
 __all__ = [
     "cayley",
+    "cayley_turned",
     "compose",
     "conjugate",
     "curvature",
@@ -46,6 +47,15 @@ def cayley(theta: Any) -> Any:
     """Unit quaternion (1, θ/2) / sqrt(1 + |θ|²/4): a turn by 2 arctan(|θ|/2) about θ."""
     scale = 1 / sqrt(1 + dot(theta, theta) / 4)
     return scale * as_vector([1, theta[0] / 2, theta[1] / 2, theta[2] / 2])
+
+
+def cayley_turned(theta: Any, v: Any) -> Any:
+    """The vector v turned by cayley(θ), v + (θ×v + θ×(θ×v)/2) / (1 + |θ|²/4).
+
+    Rational, so that UFL differentiates it to half the length of ``rotate(cayley(θ), v)``.
+    """
+    t = cross(theta, v) / (1 + dot(theta, theta) / 4)
+    return v + t + cross(theta, t) / 2
 
 
 def rotate(q: Any, v: Any) -> Any:

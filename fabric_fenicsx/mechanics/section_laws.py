@@ -69,13 +69,13 @@ def with_viscosity(elastic: ElasticSection, per_time: Any) -> SectionLaw:
 
     Args:
         elastic: the law.
-        per_time: relaxation time over step length, τ/Δt [-]; zero gives the elastic law.
+        per_time: τ times the factor c of the rate c (K − K*) [-]; zero gives the elastic law.
     """
     if elastic is LINEAR:
         return viscous_section(per_time)
 
     def law(fields: TowFields, e: Any) -> Any:
-        rate = [per_time * (e[i] - fields.strain_n[i]) if i > 2 else 0.0 for i in range(6)]
+        rate = [per_time * (e[i] - fields.strain_star[i]) if i > 2 else 0.0 for i in range(6)]
         stored, lost = elastic.forces(fields, e), elastic.at_zero(fields, rate)
         return as_vector([stored[i] + lost[i] if i > 2 else stored[i] for i in range(6)])
 

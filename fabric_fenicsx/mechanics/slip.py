@@ -1,15 +1,15 @@
 """Slip at a crossover: the springs that hold two tows together give way in the plane of the sheet.
 
 The place on the warp that holds the weft is off its node by p = R s, where R turns with the warp
-node and s lies in the plane of warp and weft. With the gap Δ from the warp node to the weft node
-and n the sheet's normal on the warp,
+node and s lies in the plane of warp and weft. With the gap Δ of mechanics.gap and n the sheet's
+normal on the warp,
 
     f = k (Δ − p),   |f_t| <= F_s with f_t = f − (f·n) n,   ṡ along f_t where |f_t| = F_s.
 
 A step is a return mapping: the trial force k (Δ − R s_n), cut in the plane at the limit. The force
-acts in the place that holds the weft, so that the warp node feels Δ × f besides; forces and moments
-balance and nothing depends on the frame. All that is the work of F(G) = Rᵀf on the gap G = RᵀΔ in
-the warp node's frame, with
+acts in the place that holds the weft, so that the warp node feels Δ × f besides what it feels by
+the gap's own arms; forces and moments balance and nothing depends on the frame. All that is the
+work of F(G) = Rᵀf on the gap G = RᵀΔ in the warp node's frame, with
 
     δG = Rᵀ δΔ − W×G
 
@@ -24,7 +24,8 @@ from typing import Any
 
 from ufl import conditional, cross, diff, dot, gt, sqrt, variable
 
-from .fields import ConnectorFields, rotation_part, translation_part
+from .fields import ConnectorFields, rotation_part
+from .gap import gap, gap_change, gap_curvature
 from .rotations import conjugate, rotate, spin, spin_change
 from .terms import Term
 
@@ -58,7 +59,7 @@ class SlippingSprings:
     def gap(self) -> Any:
         """The gap Δ in the frame of the warp node, G [mm]."""
         q, _ = self.fields.rotations(self.fields.w)
-        return rotate(conjugate(q), self.fields.gap(self.fields.w))
+        return rotate(conjugate(q), gap(self.fields, self.fields.w))
 
     def force(self, gap: Any) -> Any:
         """The force that pulls the weft node back [N], in the frame of the warp node."""
@@ -79,19 +80,20 @@ class SlippingSprings:
     def term(self, name: str) -> Term:
         """Work of the force, with energy and loss."""
         fields = self.fields
-        gap = variable(self.gap())
-        force = self.force(gap)
-        stiffness = diff(force, gap)
+        place = variable(self.gap())
+        force = self.force(place)
+        stiffness = diff(force, place)
         q, _ = fields.rotations(fields.w)
         theta, v, dw = (
             rotation_part(fields.ends(f)[0]) for f in (fields.w, fields.test, fields.trial)
         )
         spun, turned = spin(theta, v), spin(theta, dw)
-        opened = rotate(conjugate(q), translation_part(fields.test.dx(0)))
-        by_v = opened - cross(spun, gap)
-        by_dw = rotate(conjugate(q), translation_part(fields.trial.dx(0))) - cross(turned, gap)
-        both = -dot(force, cross(turned, opened) + cross(spun, by_dw))
-        both -= spin_change(theta, v, dw, spun, cross(gap, force))
+        opened = rotate(conjugate(q), gap_change(fields, fields.test))
+        by_v = opened - cross(spun, place)
+        by_dw = rotate(conjugate(q), gap_change(fields, fields.trial)) - cross(turned, place)
+        both = gap_curvature(fields, rotate(q, force))
+        both -= dot(force, cross(turned, opened) + cross(spun, by_dw))
+        both -= spin_change(theta, v, dw, spun, cross(place, force))
         tangent = dot(dot(stiffness, by_dw), by_v) + both
         point = fields.point
         energy = dot(force, force) / (2 * self.k) * point

@@ -30,8 +30,8 @@ class Term:
         energy: stored energy [N mm], if it has one.
         loss: energy lost over the step [N mm], if it dissipates: force times change, the force
             being that at the end of the step.
-        symmetric: whether the tangent is, with what makes it unsymmetric being negligible; a
-            model of such terms only is factorised at half the cost.
+        symmetric: whether the tangent is; a model of such terms only is factorised at half the
+            cost. The term "inertia" counts as such while Model.set_rates finds the rest negligible.
     """
 
     name: str

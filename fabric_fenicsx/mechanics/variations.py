@@ -25,7 +25,7 @@ from ufl import as_vector, sqrt
 
 from .rotations import rotate, spin
 
-__all__ = ["TURNS", "Varied", "add", "cross", "dot", "product", "root", "times", "turned"]
+__all__ = ["TURNS", "Jet", "add", "cross", "dot", "product", "root", "times", "turned"]
 
 #: Components of z.
 TURNS = 6
@@ -36,8 +36,8 @@ Vector = tuple[Any, Any, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Varied:
-    """A scalar or a vector and its derivatives in z.
+class Jet:
+    """A second-order jet: a scalar or a vector and its derivatives in z.
 
     Attributes:
         value: the quantity.
@@ -76,18 +76,18 @@ def _sum(*parts: Any) -> Any:
     return sum(parts)
 
 
-def add(f: Varied, g: Varied) -> Varied:
+def add(f: Jet, g: Jet) -> Jet:
     """The sum of two quantities."""
-    return Varied(
+    return Jet(
         _sum(f.value, g.value),
         [_sum(a, b) for a, b in zip(f.first, g.first, strict=True)],
         {pair: _sum(f.second[pair], g.second[pair]) for pair in PAIRS},
     )
 
 
-def product(of: Callable[[Any, Any], Any], f: Varied, g: Varied) -> Varied:
+def product(of: Callable[[Any, Any], Any], f: Jet, g: Jet) -> Jet:
     """A bilinear product of two quantities: ``times``, ``dot`` or ``cross``."""
-    return Varied(
+    return Jet(
         of(f.value, g.value),
         [_sum(of(a, g.value), of(f.value, b)) for a, b in zip(f.first, g.first, strict=True)],
         {
@@ -102,15 +102,15 @@ def product(of: Callable[[Any, Any], Any], f: Varied, g: Varied) -> Varied:
     )
 
 
-def root(f: Varied) -> Varied:
+def root(f: Jet) -> Jet:
     """The square root of a positive number."""
     r = sqrt(f.value)
     first = [slope / (2 * r) for slope in f.first]
     second = {(i, j): (f.second[i, j] / 2 - first[i] * first[j]) / r for i, j in PAIRS}
-    return Varied(r, first, second)
+    return Jet(r, first, second)
 
 
-def turned(q: Any, theta: Any, offset: int, directors: Sequence[Any]) -> list[Varied]:
+def turned(q: Any, theta: Any, offset: int, directors: Sequence[Any]) -> list[Jet]:
     """Vectors that turn with a node.
 
     Args:
@@ -144,7 +144,7 @@ def turned(q: Any, theta: Any, offset: int, directors: Sequence[Any]) -> list[Va
         for i, j in own:
             twice = cross(spins[j], first[offset + i])
             second[offset + i, offset + j] = _sum(twice, cross(change[i, j], d))
-        found.append(Varied(d, first, second))
+        found.append(Jet(d, first, second))
     return found
 
 

@@ -12,25 +12,20 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import numpy.typing as npt
-from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkDataArray, vtkObject, vtkPoints
+from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints
 from vtkmodules.vtkCommonDataModel import VTK_LINE, VTK_VERTEX, vtkCellArray, vtkUnstructuredGrid
-from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import write_text, write_vtk
 from fabric_fenicsx.solving.snapshot import Snapshot
 
-__all__ = ["TimeSeries", "listed_steps", "read_step"]
-
-PLACE = "place_of_"
-"""Begins the name of the field data that tell where a tool is."""
+__all__ = ["TimeSeries"]
 
 COMPONENTS = {
     "displacement": ("x", "y", "z"),
@@ -118,7 +113,7 @@ class TimeSeries:
             if series == "tows":
                 _add_tows(step, self._net, snapshot)
                 for name, place in places.items():
-                    step.GetFieldData().AddArray(_array(PLACE + name, np.array([place])))
+                    step.GetFieldData().AddArray(_array(f"place_of_{name}", np.array([place])))
             else:
                 _add_crossings(step, self._net, snapshot)
             step.GetFieldData().AddArray(_array("TimeValue", np.array([snapshot.time])))
@@ -129,7 +124,7 @@ class TimeSeries:
 
     def _kept(self, until: float) -> dict[int, float]:
         """Number and time of the steps that every collection names, up to a time."""
-        whole = listed_steps(self._folder, crossings="crossings" in self._grids)
+        whole = _listed_steps(self._folder, crossings="crossings" in self._grids)
         return {n: time for n, time in whole.items() if time <= until + 1e-12 * abs(until)}
 
     def _write_collection(self, series: str) -> None:
@@ -144,7 +139,7 @@ class TimeSeries:
         write_text(self._folder / f"{series}.pvd", text)
 
 
-def listed_steps(folder: Path, *, crossings: bool) -> dict[int, float]:
+def _listed_steps(folder: Path, *, crossings: bool) -> dict[int, float]:
     """Number and time [s] of the steps that a series in a folder has whole, in order.
 
     Args:
@@ -164,73 +159,8 @@ def listed_steps(folder: Path, *, crossings: bool) -> dict[int, float]:
     }
 
 
-def read_step(
-    folder: Path, net: Net, number: int, time: float
-) -> tuple[Snapshot, dict[str, npt.NDArray[np.float64]]]:
-    """A step of a series: its snapshot and where each tool was [mm], by name, shape (3,).
-
-    Args:
-        folder: that of the series.
-        net: the net of the series.
-        number: of the step, one of `listed_steps`.
-        time: of the step [s].
-
-    Raises:
-        InputError: a file is not whole or belongs to another net.
-    """
-    tows = _read_grid(_file(folder, "tows", number))
-    at_points, in_cells, fields = tows.GetPointData(), tows.GetCellData(), tows.GetFieldData()
-    shear, moment = np.zeros(0), np.zeros(0)
-    try:
-        if len(net.crossings):
-            at_crossings = _read_grid(_file(folder, "crossings", number)).GetPointData()
-            shear = np.radians(_values(at_crossings, "shear_angle_deg"))
-            moment = _values(at_crossings, "moment")
-        snapshot = Snapshot(
-            time=time,
-            displacement=_values(at_points, "displacement"),
-            directors=np.stack([_values(at_points, f"d{i + 1}") for i in range(3)], axis=1),
-            section_forces=_values(in_cells, "section_forces"),
-            section_moments=_values(in_cells, "section_moments"),
-            contact_pressure=_values(at_points, "contact_pressure"),
-            shear_angle=shear,
-            crossing_moment=moment,
-        )
-        snapshot.check(net)
-    except ValueError as error:
-        path = _file(folder, "tows", number)
-        raise InputError(f"{path}: not a step of this run ({error})") from None
-    names = (fields.GetArrayName(i) for i in range(fields.GetNumberOfArrays()))
-    places = {
-        name.removeprefix(PLACE): _values(fields, name)[0]
-        for name in names
-        if name.startswith(PLACE)
-    }
-    return snapshot, places
-
-
 def _file(folder: Path, series: str, number: int) -> Path:
     return folder / f"{series}_{number:05d}.vtu"
-
-
-def _read_grid(path: Path) -> vtkUnstructuredGrid:
-    reader = vtkXMLUnstructuredGridReader()
-    reader.SetFileName(str(path))
-    # A broken file is found by what it lacks; VTK would print its own lines about it.
-    loud = vtkObject.GetGlobalWarningDisplay()
-    vtkObject.SetGlobalWarningDisplay(0)
-    try:
-        reader.Update()
-    finally:
-        vtkObject.SetGlobalWarningDisplay(loud)
-    return reader.GetOutput()
-
-
-def _values(data: Any, name: str) -> npt.NDArray[np.float64]:
-    array = data.GetArray(name)
-    if array is None:
-        raise ValueError(f"{name} is missing")
-    return np.array(vtk_to_numpy(array), dtype=np.float64)
 
 
 def _read_collection(path: Path) -> dict[int, float]:

@@ -1,17 +1,14 @@
 """What a run leaves on disk: every accepted step, a table of steps, a ParaView series, a result.
 
 A step file holds the accepted state in the order of the net's nodes, so that a run can go on from
-it on any number of ranks. Files are written beside their place and then moved there: a run that
-dies leaves whole files only.
+it on any number of ranks, and what is seen of it (output.results). Files are written beside their
+place and then moved there: a run that dies leaves whole files only.
 """
 
 from __future__ import annotations
 
 import csv
-import errno
-import fcntl
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,67 +26,21 @@ from ..solving.snapshot import Snapshot
 from ..solving.stepping import Step, Stepper
 from .files import replacing, write_npz, write_text
 from .paraview import TimeSeries
-from .results import read_net, write_setup
+from .results import read_net, seen_arrays, write_setup
 from .surfaces import tool_surface
 
-__all__ = ["Record", "load_state", "prepare_folder", "write_result"]
+__all__ = ["Record", "load_state", "write_result"]
 
 PLATE_EXTENT = 1.24
 """How far out die and holder are drawn, over the farthest node of the flat sheet."""
 
-STEP_SCHEMA = "fabric-step/2"
+STEP_SCHEMA = "fabric-step/3"
 
 STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6 * DEPTH}
 """What a step file has for each node, and how many numbers of it."""
 
-NUMBERS = ("time", "number", "previous_steps", "predictor_order", "next_step")
+NUMBERS = ("time", "number", "previous_steps", "predictor_order", "last_step", "next_step")
 """What it has beside."""
-
-_CLAIMED: dict[Path, int] = {}
-"""Folders that this process has locked, and the handles that hold the locks."""
-
-
-def prepare_folder(folder: Path, comm: Any) -> None:
-    """Make the output folder and keep other runs out of it until this process ends; collective.
-
-    Raises:
-        InputError: it cannot be made or written, or another run writes there (on every rank).
-    """
-    problem = None
-    if comm.rank == 0:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            probe = folder / ".writable"
-            probe.write_text("")
-            probe.unlink()
-            problem = _claim(folder)
-        except OSError as error:
-            problem = f"{folder}: the output folder cannot be written ({error.strerror})"
-    problem = comm.bcast(problem)
-    if problem:
-        raise InputError(problem)
-
-
-def _claim(folder: Path) -> str | None:
-    """Lock the folder; what is wrong if another process has it.
-
-    The system drops the lock with the process, however that ends, so that none is ever stale.
-    """
-    if folder.resolve() in _CLAIMED:
-        return None
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(handle)
-        return f"{folder}: another run writes there, allowed is another folder"
-    except OSError as error:
-        # Some network file systems know no locks; there two runs are the user's own affair.
-        if error.errno not in (errno.EBADF, errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):
-            os.close(handle)
-            raise
-    _CLAIMED[folder.resolve()] = handle
-    return None
 
 
 class Record:
@@ -100,6 +51,8 @@ class Record:
         model: what is run.
         resume_at: keep the steps up to this time [s]; None starts afresh.
         case_text: what `case.yaml` shall say; None writes none.
+        quarter: whether the model is the part x >= 0, y >= 0 of a symmetric sheet; forces and
+            energies in `steps.csv` are of the whole one.
     """
 
     def __init__(
@@ -109,18 +62,20 @@ class Record:
         *,
         resume_at: float | None = None,
         case_text: str | None = None,
+        quarter: bool = False,
     ) -> None:
         self.folder, self.model = folder, model
         self.rows: list[dict[str, float]] = []
         self.steps = folder / "steps"
         self._root = model.comm.rank == 0
+        self._seen: dict[str, npt.NDArray[np.float64]] = {}
         if self._root:
             self._open(resume_at)
             (folder / "case.yaml").unlink(missing_ok=True)
             if case_text is not None:
                 write_text(folder / "case.yaml", case_text)
         past = model.comm.bcast(self.rows[-1] if self.rows else None)
-        self._balance = Balance(model, past)
+        self._balance = Balance(model, past, quarter=quarter)
 
     def _open(self, resume_at: float | None) -> None:
         """Start the series and the table, or cut both at the time to go on from."""
@@ -155,10 +110,10 @@ class Record:
         row |= self._balance.step(step.time)
         row |= measure(snapshot)
         self.rows.append(row)
+        places = {tool.name: model.tool_place(tool.name) for tool in model.tools}
+        self._seen = seen_arrays(snapshot, places)
         if self._root:
-            self._series.add(
-                snapshot, {tool.name: model.tool_place(tool.name) for tool in model.tools}
-            )
+            self._series.add(snapshot, places)
             with replacing(self.folder / "steps.csv") as path, path.open("w", newline="") as file:
                 writer = csv.DictWriter(file, list(row))
                 writer.writeheader()
@@ -166,7 +121,7 @@ class Record:
         return snapshot
 
     def keep(self, step: Step, stepper: Stepper) -> None:
-        """Write the accepted state."""
+        """Write the accepted state, and what `observe` has seen of it."""
         disc, state, predictor = self.model.disc, stepper.state, stepper.predictor
         n = disc.owned
         arrays = {
@@ -186,9 +141,11 @@ class Record:
                 "number": step.number,
                 "previous_steps": predictor.lengths,
                 "predictor_order": predictor.order,
+                "last_step": state.last_step,
                 "next_step": state.next_step,
             }
             arrays = {name: np.asarray(value) for name, value in scalars.items()} | whole
+            arrays |= self._seen
             arrays |= {f"history: {name}": values for name, values in histories.items()}
             path = self.steps / f"step_{step.number:05d}.npz"
             write_npz(path, arrays, compressed=False)
@@ -241,6 +198,7 @@ def load_state(path: Path, stepper: Stepper) -> None:
     stepper.predictor.lengths = data["previous_steps"]
     stepper.predictor.order = int(data["predictor_order"])
     state.time = float(data["time"])
+    state.last_step = float(data["last_step"])
     state.next_step = float(data["next_step"])
     stepper.number = int(data["number"])
     prefix = "history: "

@@ -1,23 +1,23 @@
 """The folder of a run as others read it, without dolfinx: net, tools and accepted steps.
 
 `net.npz` is the undeformed net, `tools/punch.vtp` the shape of a tool in coordinates of its own;
-`paraview/` has what changes from step to step, the places of the tools among it.
+`steps/` has what changes from step to step, the places of the tools among it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pyvista as pv
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import write_npz, write_vtk
 from fabric_fenicsx.output.mirror import whole_sheet
-from fabric_fenicsx.output.paraview import listed_steps, read_step
 from fabric_fenicsx.output.surfaces import (
     OTHER_COLOUR,
     TOOL_COLOURS,
@@ -27,7 +27,10 @@ from fabric_fenicsx.output.surfaces import (
 )
 from fabric_fenicsx.solving.snapshot import Snapshot
 
-__all__ = ["Results", "read_net", "read_results", "write_setup"]
+__all__ = ["Results", "read_net", "read_results", "seen_arrays", "write_setup"]
+
+SEEN = [f.name for f in fields(Snapshot) if f.name not in ("time", "displacement")]
+"""Arrays of a snapshot that a step file has beside its time and its state, of which u is one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +97,7 @@ class Results:
             InputError: a file of the step is broken.
         """
         net = self.net
-        snapshot, places = read_step(self.folder / "paraview", net, number, self.steps[number])
+        snapshot, places = _read_step(_step_file(self.folder, number), net)
         if mirror:
             net, snapshot = whole_sheet(net, snapshot)
         tools = [replace(t, place=places[t.name]) for t in self.tools if t.name in places]
@@ -149,22 +152,67 @@ def read_net(path: Path) -> Net:
         raise InputError(f"{path}: not the net of a run ({line})") from None
 
 
-def read_results(folder: Path) -> Results:
+def read_results(folder: Path | str) -> Results:
     """Open the folder of a run.
 
     Raises:
         InputError: it is none, or it has no accepted step.
     """
+    folder = Path(folder)
     parts = sorted(path.parent for path in folder.glob("*/net.npz"))
     if not (folder / "net.npz").exists() and parts:
         names = " or ".join(str(part) for part in parts)
         raise InputError(f"{folder}: has several specimens, allowed is {names}")
     net = read_net(folder / "net.npz")
-    steps = listed_steps(folder / "paraview", crossings=len(net.crossings) > 0)
+    found = (int(path.stem.removeprefix("step_")) for path in folder.glob("steps/step_*[0-9].npz"))
+    steps = {number: _time_of(_step_file(folder, number)) for number in sorted(found)}
     if not steps:
         raise InputError(f"{folder}: no accepted step, allowed is the folder of a run that has one")
     tools = [_tool(path) for path in sorted((folder / "tools").glob("*.vtp"))]
     return Results(folder, net, tools, steps)
+
+
+def seen_arrays(
+    snapshot: Snapshot, places: Mapping[str, npt.NDArray[np.float64]]
+) -> dict[str, npt.NDArray[np.float64]]:
+    """What a step file has beside the state to go on from, for those who look at a run.
+
+    Args:
+        snapshot: of the step.
+        places: where each tool is [mm], by its name.
+    """
+    arrays = {f"seen: {name}": getattr(snapshot, name) for name in SEEN}
+    return arrays | {f"place: {name}": place for name, place in places.items()}
+
+
+def _read_step(path: Path, net: Net) -> tuple[Snapshot, dict[str, npt.NDArray[np.float64]]]:
+    """A step's snapshot and where each tool was [mm], by name."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            seen = {name: file[f"seen: {name}"] for name in SEEN}
+            snapshot = Snapshot(time=float(file["time"]), displacement=file["u"], **seen)
+            snapshot.check(net)
+            prefix = "place: "
+            names = [name for name in file.files if name.startswith(prefix)]
+            return snapshot, {name.removeprefix(prefix): file[name] for name in names}
+    except Exception as error:  # a broken archive raises whatever it likes
+        raise _no_step(path, error) from None
+
+
+def _time_of(path: Path) -> float:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return float(file["time"])
+    except Exception as error:
+        raise _no_step(path, error) from None
+
+
+def _no_step(path: Path, error: Exception) -> InputError:
+    return InputError(f"{path}: not a step of this run ({' '.join(str(error).split())})")
+
+
+def _step_file(folder: Path, number: int) -> Path:
+    return folder / "steps" / f"step_{number:05d}.npz"
 
 
 def _tool(path: Path) -> TriangleSurface:

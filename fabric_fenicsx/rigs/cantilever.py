@@ -6,35 +6,67 @@ is a net of its own. The weight is put on gradually; nothing moves in the end, s
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
 from ..fabric.net import WEFT, Net
-from ..output.files import replacing
-from ..output.pictures import draw_net
-from ..solving.model import Model, Support
-from ..solving.snapshot import Snapshot
-from ..solving.stepping import StepControl
-from .cases import CantileverCase
-from .common import Session, extend, fabric_model, tow_net, write_table
-from .fabrics import strip
-from .simulation import Run, simulate
+from ..fabric.paths import TowPaths
+from ..fabric.sheet import Sheet
+from ..inputs.groups import Positive
+from .cases import PlainWeaveCase
+from .rig import Rig
 
-__all__ = ["build", "midline", "run"]
+if TYPE_CHECKING:
+    from ..solving.model import Model
+    from ..solving.snapshot import Snapshot
+    from .common import Session
+    from .simulation import Run
+
+__all__ = ["RIG", "CantileverCase", "build", "midline", "run", "strip"]
 
 Array = npt.NDArray[np.float64]
 
 
+class CantileverCase(PlainWeaveCase):
+    """A strip clamped at one end bends under its own weight; weft tows hang over the edge."""
+
+    test: Literal["cantilever"]
+    lengths_mm: list[Positive] = Field(
+        [76.2, 152.4, 228.6], min_length=1, description="overhang of each specimen"
+    )
+    width_mm: Positive = Field(76.2, description="of the specimens")
+    gravity_mm_s2: Positive = Field(9810.0, description="downwards")
+    load_steps: Annotated[int, Field(ge=1, le=1000)] = Field(
+        20, description="the weight is put on in this many equal steps, fewer if they go well"
+    )
+
+
+def strip(case: CantileverCase, length: float) -> Sheet:
+    """A specimen of this overhang; warp tows across it, as many as fit."""
+    return case.woven((0.0, length), (0.0, case.width_mm))
+
+
+def fabrics(case: CantileverCase, base: Path) -> dict[str, TowPaths]:
+    """The specimens, the shortest first."""
+    return {f"specimen {length:g} mm": strip(case, length) for length in sorted(case.lengths_mm)}
+
+
 def build(case: CantileverCase, length: float, session: Session) -> Model:
     """The model of one specimen; its weight grows from nothing to all at time 1. Collective."""
+    from ..solving.model import Support
+    from .common import fabric_model, tow_net
+
     net = tow_net(case, strip(case, length), session)
     clamped = np.flatnonzero(net.points[:, 0] < 1e-9 * np.ptp(net.points))
     return fabric_model(
         case,
         net,
-        (case.warp_spacing_mm, case.weft_spacing_mm),
+        case.spacings,
         session,
         gravity=(0.0, 0.0, -case.gravity_mm_s2),
         load=lambda time: time,
@@ -63,6 +95,9 @@ def run(case: CantileverCase, session: Session) -> dict[str, Any]:
     Returns:
         The content of result.json; it stops at the first specimen that does not finish.
     """
+    from ..output.pictures import draw_net
+    from .common import extend, write_table
+
     tables: dict[str, list[Array]] = {name: [] for name in ("length_mm", "s_mm", "x_mm", "z_mm")}
     specimens: list[dict[str, float]] = []
     totals: dict[str, Any] = {}
@@ -92,6 +127,9 @@ def run(case: CantileverCase, session: Session) -> dict[str, Any]:
 def _hang(
     case: CantileverCase, session: Session, model: Model, length: float, begun: float, share: float
 ) -> Run:
+    from ..solving.stepping import StepControl
+    from .common import simulated
+
     step = 1.0 / case.load_steps
     folder = session.folder / f"specimen_{length:g}mm"
     if session.root:
@@ -102,18 +140,16 @@ def _hang(
         _, x, z = midline(model.net, snapshot.displacement)
         return {"load": snapshot.time, "tip_x_mm": float(x[-1]), "tip_z_mm": float(z[-1])}
 
-    return simulate(
+    def progress(done: float, number: int, iterations: int) -> None:
+        session.progress(begun + share * done, number, iterations)
+
+    return simulated(
+        case,
         model,
-        folder,
-        test="cantilever",
+        replace(session, folder=folder, progress=progress, resume=False),
         end=1.0,
         control=StepControl(first=step, smallest=min(step, 1e-4), largest=step),
-        force_tolerance=case.solver.force_tolerance_N,
-        iteration_limit=case.solver.iteration_limit,
         measure=measure,
-        progress=lambda time, number, its: session.progress(begun + share * time, number, its),
-        case_text=session.case_text,
-        started=session.started,
     )
 
 
@@ -131,6 +167,8 @@ def _add(totals: dict[str, Any], outcome: Run) -> dict[str, Any]:
 def _draw(session: Session, table: dict[str, Array]) -> None:
     from matplotlib.figure import Figure
 
+    from ..output.files import replacing
+
     figure = Figure(figsize=(6.0, 6.0), layout="constrained")
     axes = figure.subplots()
     for length in dict.fromkeys(table["length_mm"]):
@@ -141,3 +179,12 @@ def _draw(session: Session, table: dict[str, Array]) -> None:
     axes.legend()
     with replacing(session.folder / "shape.png") as path:
         figure.savefig(path, dpi=150)
+
+
+RIG = Rig(
+    case=CantileverCase,
+    fabrics=fabrics,
+    run=run,
+    steps=lambda case: float(case.load_steps),
+    iterations=2.5,
+)

@@ -1,4 +1,4 @@
-"""Case files: what each key means, its unit, its default and what is allowed.
+"""Keys that the rigs share: what each means, its unit, its default and what is allowed.
 
 A unit stands in the name of its key: mm, N, s, kg (the one exception to the package's tonne, as in
 the paper's Table 3). Shear laws are per unit area of fabric, so that they do not depend on the
@@ -8,27 +8,21 @@ m · warp spacing · weft spacing.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
+from ..fabric.sheet import Sheet, spaced_sheet
 from ..inputs.groups import Keys, NotNegative, Positive
 from ..mechanics.laws.dashpots import LinearDashpot
 from ..mechanics.laws.springs import PolynomialSpring
 from .shear_law_keys import ShearLawKeys
-from .weave_keys import SheetKeys, WeaveKeys
 
 __all__ = [
-    "CASES",
     "Assumptions",
-    "CantileverCase",
     "Case",
-    "ContactKeys",
     "CrossoverKeys",
-    "DrapeCase",
-    "PictureFrameCase",
-    "PointKeys",
-    "SheetKeys",
+    "PlainWeaveCase",
     "SolverKeys",
     "TowKeys",
     "TowTypeKeys",
@@ -110,20 +104,6 @@ class CrossoverKeys(Keys):
     )
 
 
-class ContactKeys(Keys):
-    """Pressure and friction between tows and tools."""
-
-    stiffness_N_mm2: Positive = Field(0.5, description="force per tow length and penetration")
-    layer_mm: Positive = Field(0.5, description="penetration over which the stiffness builds up")
-    friction: NotNegative = Field(0.0, description="Coulomb coefficient; 0 for oiled tools")
-    stick_stiffness_N_mm2: Positive = Field(
-        0.5, description="friction force per tow length and stretch of the stick"
-    )
-    frictionless: list[Literal["punch", "die", "holder"]] = Field(
-        [], description="tools without friction, as oiled ones"
-    )
-
-
 class SolverKeys(Keys):
     """Steps and tolerances."""
 
@@ -151,21 +131,11 @@ class SolverKeys(Keys):
         return self
 
 
-class PointKeys(Keys):
-    """A place on the flat sheet where the angle between the tows was measured."""
-
-    x_mm: float = Field(description="on the undeformed sheet, from the punch axis")
-    y_mm: float = Field(description="on the undeformed sheet, from the punch axis")
-    measured_deg: float | None = Field(None, description="measured angle, mean")
-    std_deg: NotNegative | None = Field(None, description="its standard deviation")
-    paper_deg: float | None = Field(None, description="the paper's own simulation")
-
-
 Assumptions = dict[str, str]
 
 
-class Common(Keys):
-    """Keys of every rig."""
+class Case(Keys):
+    """Keys of every rig; those of its own stand in the rig's file."""
 
     title: str = Field("", description="free text")
     tow: TowKeys = Field(default_factory=TowKeys, description="the virtual tows")
@@ -181,9 +151,10 @@ class Common(Keys):
         default_factory=dict,
         description="for keys that no source gives: the reason for the value, by dotted key",
     )
+    test: str
 
     @model_validator(mode="after")
-    def _assumptions_name_keys(self) -> Common:
+    def _assumptions_name_keys(self) -> Case:
         for dotted in self.assumptions:
             value: object = self
             for part in dotted.split("."):
@@ -194,111 +165,20 @@ class Common(Keys):
         return self
 
 
-class DrapeCase(Common):
-    """A hemispherical punch drapes a sheet through a holed die under a blank holder."""
+class PlainWeaveCase(Case):
+    """Keys of a rig whose fabric is a plain weave of evenly spaced tows."""
 
-    test: Literal["drape"]
-    sheet: SheetKeys = Field(default_factory=SheetKeys, description="ignored where `mesh` is given")
-    weave: WeaveKeys | None = Field(
-        None, description="another weave than a plain one of straight tows at right angles"
-    )
-    symmetry: Literal["quarter", "none"] = Field(
-        "quarter", description="model x >= 0, y >= 0 only, or the whole sheet"
-    )
-    punch_radius_mm: Positive = Field(76.2, description="radius of the hemisphere")
-    punch_stl: str | None = Field(
-        None,
-        description="a punch of another shape: STL file in mm, its axis x = y = 0, pressing "
-        "downwards with its lowest point first",
-    )
-    punch_cell_mm: Positive = Field(
-        1.0, description="grid of the distance from that punch; its edges are rounded over a cell"
-    )
-    hole_radius_mm: Positive = Field(80.0, description="of die and holder")
-    edge_radius_mm: Positive = Field(10.0, description="rounding of the holes' edges")
-    punch_travel_mm: Positive = Field(65.0, description="depth of the draw")
-    duration_s: Positive = Field(60.0, description="time of the draw")
-    holder_gap_start_mm: float = Field(1.0, description="between holder and die at the start")
-    holder_gap_mm: float = Field(
-        -0.2,
-        description="between holder and die when closed; below zero the contact layers overlap",
-    )
-    holder_force_N: Positive | None = Field(
-        None,
-        description="force that pushes the whole holder down, instead of holder_gap_mm; its height "
-        "then follows from balance",
-    )
-    holder_closing_s: Positive = Field(
-        6.0, description="time the holder takes to close, or its force to rise"
-    )
-    punch_offset_x_mm: float = Field(0.0, description="punch axis from the sheet's centre")
-    punch_offset_y_mm: float = Field(0.0, description="punch axis from the sheet's centre")
-    gravity_mm_s2: NotNegative = Field(9810.0, description="downwards")
-    contact: ContactKeys = Field(default_factory=ContactKeys, description="tows on tools")
-    points: list[PointKeys] = Field(default_factory=list, description="where angles are compared")
-
-    @model_validator(mode="after")
-    def _fits(self) -> DrapeCase:
-        if self.holder_force_N is not None and "holder_gap_mm" in self.model_fields_set:
-            raise ValueError("holder_force_N, holder_gap_mm: one of the two")
-        if self.symmetry == "quarter" and (self.punch_offset_x_mm or self.punch_offset_y_mm):
-            raise ValueError("punch_offset_x_mm, punch_offset_y_mm: need symmetry: none")
-        too_deep = self.punch_travel_mm > self.punch_radius_mm + self.edge_radius_mm
-        if self.punch_stl is None and too_deep:
-            raise ValueError(
-                "punch_travel_mm: at most punch_radius_mm + edge_radius_mm, "
-                "the punch is a hemisphere without a shank"
-            )
-        return self
-
-
-class PictureFrameCase(Common):
-    """A hinged square frame shears the fabric whose tows are pinned to its bars."""
-
-    test: Literal["picture_frame"]
     warp_spacing_mm: Positive = Field(12.0, description="distance between warp tows")
     weft_spacing_mm: Positive = Field(12.0, description="distance between weft tows")
     subdivisions: Annotated[int, Field(ge=1, le=64)] = Field(
         2, description="cells of a tow between two crossings"
     )
-    frame_length_mm: Positive = Field(192.0, description="L_frame, between the hinges of a bar")
-    fabric_length_mm: Positive = Field(96.0, description="L_fabric, side of the woven square")
-    rate_mm_min: Positive = Field(35.0, description="speed of the crosshead")
-    travel_mm: Positive = Field(94.7, description="of the crosshead; 94.7 mm is 55 degrees")
-    hold_s: NotNegative = Field(180.0, description="time at rest before the way back")
-    unload: bool = Field(True, description="move back to the square")
 
-    @model_validator(mode="after")
-    def _fits(self) -> PictureFrameCase:
-        if self.fabric_length_mm > self.frame_length_mm:
-            raise ValueError("fabric_length_mm: at most frame_length_mm")
-        if self.travel_mm >= (2.0 - 2.0**0.5) * self.frame_length_mm:
-            raise ValueError("travel_mm: less than (2 - sqrt 2) frame_length_mm, the closed frame")
-        return self
+    @property
+    def spacings(self) -> tuple[float, float]:
+        """Distance between warp and between weft tows [mm]."""
+        return self.warp_spacing_mm, self.weft_spacing_mm
 
-
-class CantileverCase(Common):
-    """A strip clamped at one end bends under its own weight; weft tows hang over the edge."""
-
-    test: Literal["cantilever"]
-    lengths_mm: list[Positive] = Field(
-        [76.2, 152.4, 228.6], min_length=1, description="overhang of each specimen"
-    )
-    width_mm: Positive = Field(76.2, description="of the specimens")
-    warp_spacing_mm: Positive = Field(12.0, description="distance between warp tows")
-    weft_spacing_mm: Positive = Field(12.0, description="distance between weft tows")
-    subdivisions: Annotated[int, Field(ge=1, le=64)] = Field(
-        2, description="cells of a tow between two crossings"
-    )
-    gravity_mm_s2: Positive = Field(9810.0, description="downwards")
-    load_steps: Annotated[int, Field(ge=1, le=1000)] = Field(
-        20, description="the weight is put on in this many equal steps, fewer if they go well"
-    )
-
-
-Case = DrapeCase | PictureFrameCase | CantileverCase
-
-CASES: dict[str, type[Common]] = {
-    get_args(model.model_fields["test"].annotation)[0]: model for model in get_args(Case)
-}
-"""The model of each rig's keys, without the rigs themselves: they need dolfinx."""
+    def woven(self, x_range: tuple[float, float], y_range: tuple[float, float]) -> Sheet:
+        """A sheet with as many tows as fit, warp along y, centred between its edges [mm]."""
+        return spaced_sheet(x_range, y_range, *self.spacings, subdivisions=self.subdivisions)

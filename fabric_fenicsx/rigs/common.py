@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -18,23 +17,29 @@ import pandas as pd
 
 from ..errors import InputError
 from ..fabric.crossings import tow_numbers
-from ..fabric.gmsh_io import read_msh, write_msh
-from ..fabric.layout import TowLayout
+from ..fabric.gmsh_io import mesh_net, read_msh
 from ..fabric.net import WARP, WEFT, Net
+from ..fabric.paths import TowPaths
 from ..fabric.section import RectangularSection
-from ..fabric.sheet import Sheet
+from ..mechanics.laws.law import CrossingLaw
 from ..output.files import write_text
+from ..parallel import from_root
 from ..solving.model import Model
 from ..solving.parts import CrossoverLaw
+from ..solving.snapshot import Snapshot
 from ..solving.stepping import StepControl
-from .cases import Common, CrossoverKeys, SolverKeys, TowKeys
+from .cases import Case, CrossoverKeys, SolverKeys, TowKeys
+from .registry import rig
+from .simulation import Run, simulate
 
 __all__ = [
     "Session",
     "control",
     "crossover_law",
     "extend",
+    "mesh",
     "section",
+    "simulated",
     "tow_net",
     "tow_sections",
     "write_table",
@@ -54,6 +59,7 @@ class Session:
         resume: go on from the last step in the folder.
         pictures: draw them.
         case_text: the case as it is run, kept beside the records.
+        laws: of the crossings, beside those of the case, from the area of a crossing [mm²].
     """
 
     folder: Path
@@ -64,6 +70,7 @@ class Session:
     resume: bool = False
     pictures: bool = True
     case_text: str | None = None
+    laws: tuple[Callable[[float], CrossingLaw], ...] = ()
 
     @property
     def root(self) -> bool:
@@ -84,7 +91,7 @@ def section(keys: TowKeys) -> RectangularSection:
 
 
 def tow_sections(
-    case: Common, net: Net
+    case: Case, net: Net
 ) -> tuple[tuple[RectangularSection, ...], npt.NDArray[np.int64]]:
     """The sections of a case's tows, and which of them each tow of the net has, (n_tows,).
 
@@ -109,22 +116,23 @@ def tow_sections(
     return tuple(sections), kind
 
 
-def crossover_law(keys: CrossoverKeys, warp_spacing: float, weft_spacing: float) -> CrossoverLaw:
-    """Laws per crossing from laws per area: M = m · warp spacing · weft spacing."""
-    area = warp_spacing * weft_spacing
+def crossover_law(
+    keys: CrossoverKeys, area: float, more: Sequence[Callable[[float], CrossingLaw]] = ()
+) -> CrossoverLaw:
+    """Laws per crossing from laws per area: M = m · area of a crossing [mm²]."""
     return CrossoverLaw(
         translation=keys.translation_N_mm,
         k1=keys.k1_N_mm * area,
         k3=keys.k3_N_mm * area,
         dashpot=keys.dashpot_N_s_mm * area,
         alignment=keys.alignment_N_mm,
-        laws=tuple(law.build(area) for law in keys.laws),
+        laws=(*(law.build(area) for law in keys.laws), *(law(area) for law in more)),
         slip_limit=keys.slip_limit_N,
     )
 
 
 def fabric_model(
-    case: Common, net: Net, spacings: tuple[float, float], session: Session, **rig: Any
+    case: Case, net: Net, spacings: tuple[float, float], session: Session, **rig: Any
 ) -> Model:
     """The model of a case's tows and crossings on its net. Collective.
 
@@ -141,7 +149,7 @@ def fabric_model(
         sections,
         tow_section=kind,
         section_law=case.tow.section_law,
-        crossovers=crossover_law(case.crossover, *spacings),
+        crossovers=crossover_law(case.crossover, spacings[0] * spacings[1], session.laws),
         comm=session.comm,
         **rig,
     )
@@ -157,9 +165,63 @@ def control(keys: SolverKeys, largest_move: float = math.inf) -> StepControl:
     )
 
 
-def tow_net(
-    case: Common, sheet: Sheet | TowLayout, session: Session, *, crossing_gap: float = 0.0
-) -> Net:
+def simulated(
+    case: Case,
+    model: Model,
+    session: Session,
+    *,
+    end: float,
+    control: StepControl,
+    stops: Sequence[float] = (),
+    measure: Callable[[Snapshot], dict[str, float]] = lambda snapshot: {},
+) -> Run:
+    """Run the model of a case to its end, or as far as it goes. Collective.
+
+    Args:
+        case: the case.
+        model: its model.
+        session: where and how it runs.
+        end: final time [s].
+        control: step lengths.
+        stops: times that steps must not jump over [s].
+        measure: further columns for each step's row, from its snapshot.
+
+    Raises:
+        InputError: there is nothing to resume.
+    """
+    return simulate(
+        model,
+        session.folder,
+        test=case.test,
+        end=end,
+        stops=stops,
+        control=control,
+        force_tolerance=case.solver.force_tolerance_N,
+        iteration_limit=case.solver.iteration_limit,
+        measure=measure,
+        progress=lambda time, step, its: session.progress(time / end, step, its),
+        resume=session.resume,
+        case_text=session.case_text,
+        started=session.started,
+        quarter=rig(case.test).quarter(case),
+    )
+
+
+def mesh(fabric: TowPaths, *, comm: MPI.Comm = MPI.COMM_WORLD) -> Net:
+    """The net of tows in the plane, by gmsh; the same on every rank. Collective.
+
+    Args:
+        fabric: its tows, as a Sheet or a TowLayout.
+        comm: communicator.
+
+    Raises:
+        InputError: there is no such net (on every rank).
+    """
+    net: Net = from_root(comm, lambda: mesh_net(fabric))
+    return net
+
+
+def tow_net(case: Case, sheet: TowPaths, session: Session, *, crossing_gap: float = 0.0) -> Net:
     """The net of a case: from its .msh, or from the sheet by gmsh. Collective.
 
     Args:
@@ -171,28 +233,19 @@ def tow_net(
     Raises:
         InputError: the mesh cannot be read (on every rank).
     """
-    comm = session.comm
-    net: Net | None = None
-    problem: str | None = None
-    if session.root:
-        try:
-            if case.mesh is not None:
-                net = read_msh(session.base / case.mesh, crossing_gap=crossing_gap)
-            else:
-                with tempfile.TemporaryDirectory() as folder:
-                    path = Path(folder) / "tows.msh"
-                    write_msh(sheet, path)
-                    net = read_msh(path, crossing_gap=crossing_gap)
-        except InputError as error:
-            problem = str(error)
-    problem = comm.bcast(problem)
-    if problem is not None:
-        raise InputError(problem)
-    whole: Net = comm.bcast(net)
-    return whole
+
+    def load() -> Net:
+        if case.mesh is not None:
+            return read_msh(session.base / case.mesh, crossing_gap=crossing_gap)
+        return mesh_net(sheet, crossing_gap=crossing_gap)
+
+    net: Net = from_root(session.comm, load)
+    return net
 
 
-def write_table(session: Session, name: str, columns: dict[str, npt.NDArray[Any]]) -> None:
+def write_table(
+    session: Session, name: str, columns: Mapping[str, Sequence[float] | npt.NDArray[Any]]
+) -> None:
     """Write a CSV into the results, on rank 0."""
     if session.root:
         text = pd.DataFrame(columns).to_csv(index=False, float_format="%.9g")

@@ -9,38 +9,154 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field, model_validator
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
 from ..fabric.crossings import reference_angle
+from ..fabric.layout import TowLayout
 from ..fabric.net import Net
-from ..geometry.distance import DistanceGrid
-from ..geometry.triangles import read_stl
-from ..mechanics.tools import HoledPlate, Mould, Sphere, Tool
-from ..output.pictures import draw_net
-from ..output.surfaces import tool_surface
-from ..solving.generalised_alpha import GeneralisedAlpha
-from ..solving.model import Model, Support
-from ..solving.parts import ContactLaw
-from ..solving.snapshot import Snapshot
-from .cases import ContactKeys, DrapeCase
-from .common import (
-    Session,
-    control,
-    extend,
-    fabric_model,
-    lowest,
-    tow_net,
-    write_table,
-)
-from .fabrics import crossing_gap, flat_sheet
-from .simulation import Run, simulate
-from .weave_keys import crossing_weights
+from ..fabric.paths import TowPaths
+from ..fabric.sheet import Sheet, centred_sheet
+from ..inputs.groups import Keys, NotNegative, Positive
+from .cases import Case
+from .rig import Rig
+from .weave_keys import SheetKeys, WeaveKeys, crossing_weights, layout
 
-__all__ = ["angles_at", "build", "run", "tools"]
+if TYPE_CHECKING:
+    from ..mechanics.tools import Tool
+    from ..solving.model import Model, Support
+    from ..solving.parts import ContactLaw
+    from ..solving.snapshot import Snapshot
+    from .common import Session
+    from .simulation import Run
+
+__all__ = ["RIG", "DrapeCase", "angles_at", "build", "run", "tools"]
+
+
+class ContactKeys(Keys):
+    """Pressure and friction between tows and tools."""
+
+    stiffness_N_mm2: Positive = Field(0.5, description="force per tow length and penetration")
+    layer_mm: Positive = Field(0.5, description="penetration over which the stiffness builds up")
+    friction: NotNegative = Field(0.0, description="Coulomb coefficient; 0 for oiled tools")
+    stick_stiffness_N_mm2: Positive = Field(
+        0.5, description="friction force per tow length and stretch of the stick"
+    )
+    frictionless: list[Literal["punch", "die", "holder"]] = Field(
+        [], description="tools without friction, as oiled ones"
+    )
+
+
+class PointKeys(Keys):
+    """A place on the flat sheet where the angle between the tows was measured."""
+
+    x_mm: float = Field(description="on the undeformed sheet, from the punch axis")
+    y_mm: float = Field(description="on the undeformed sheet, from the punch axis")
+    measured_deg: float | None = Field(None, description="measured angle, mean")
+    std_deg: NotNegative | None = Field(None, description="its standard deviation")
+    paper_deg: float | None = Field(None, description="the paper's own simulation")
+
+
+class DrapeCase(Case):
+    """A hemispherical punch drapes a sheet through a holed die under a blank holder."""
+
+    test: Literal["drape"]
+    sheet: SheetKeys = Field(default_factory=SheetKeys, description="ignored where `mesh` is given")
+    weave: WeaveKeys | None = Field(
+        None, description="another weave than a plain one of straight tows at right angles"
+    )
+    symmetry: Literal["quarter", "none"] = Field(
+        "quarter", description="model x >= 0, y >= 0 only, or the whole sheet"
+    )
+    punch_radius_mm: Positive = Field(76.2, description="radius of the hemisphere")
+    punch_stl: str | None = Field(
+        None,
+        description="a punch of another shape: STL file in mm, its axis x = y = 0, pressing "
+        "downwards with its lowest point first",
+    )
+    punch_cell_mm: Positive = Field(
+        1.0, description="grid of the distance from that punch; its edges are rounded over a cell"
+    )
+    hole_radius_mm: Positive = Field(80.0, description="of die and holder")
+    edge_radius_mm: Positive = Field(10.0, description="rounding of the holes' edges")
+    punch_travel_mm: Positive = Field(65.0, description="depth of the draw")
+    duration_s: Positive = Field(60.0, description="time of the draw")
+    holder_gap_start_mm: float = Field(1.0, description="between holder and die at the start")
+    holder_gap_mm: float = Field(
+        -0.2,
+        description="between holder and die when closed; below zero the contact layers overlap",
+    )
+    holder_force_N: Positive | None = Field(
+        None,
+        description="force that pushes the whole holder down, instead of holder_gap_mm; its height "
+        "then follows from balance",
+    )
+    holder_closing_s: Positive = Field(
+        6.0, description="time the holder takes to close, or its force to rise"
+    )
+    punch_offset_x_mm: float = Field(0.0, description="punch axis from the sheet's centre")
+    punch_offset_y_mm: float = Field(0.0, description="punch axis from the sheet's centre")
+    gravity_mm_s2: NotNegative = Field(9810.0, description="downwards")
+    contact: ContactKeys = Field(default_factory=ContactKeys, description="tows on tools")
+    points: list[PointKeys] = Field(default_factory=list, description="where angles are compared")
+
+    @model_validator(mode="after")
+    def _fits(self) -> DrapeCase:
+        if self.holder_force_N is not None and "holder_gap_mm" in self.model_fields_set:
+            raise ValueError("holder_force_N, holder_gap_mm: one of the two")
+        if self.symmetry == "quarter" and (self.punch_offset_x_mm or self.punch_offset_y_mm):
+            raise ValueError("punch_offset_x_mm, punch_offset_y_mm: need symmetry: none")
+        too_deep = self.punch_travel_mm > self.punch_radius_mm + self.edge_radius_mm
+        if self.punch_stl is None and too_deep:
+            raise ValueError(
+                "punch_travel_mm: at most punch_radius_mm + edge_radius_mm, "
+                "the punch is a hemisphere without a shank"
+            )
+        return self
+
+
+def flat_sheet(case: DrapeCase, base: Path) -> Sheet | TowLayout:
+    """The sheet, or its quarter; files of its weave count from ``base``."""
+    keys = case.sheet
+    quarter = case.symmetry == "quarter"
+    if case.weave is not None:
+        return layout(case.weave, keys, quarter=quarter, base=base)
+    return centred_sheet(
+        keys.width_mm,
+        keys.length_mm,
+        keys.warp_spacing_mm,
+        keys.weft_spacing_mm,
+        subdivisions=keys.subdivisions,
+        quarter=quarter,
+    )
+
+
+def fabrics(case: DrapeCase, base: Path) -> dict[str, TowPaths]:
+    """The one sheet."""
+    return {"sheet": flat_sheet(case, base)}
+
+
+def crossing_gap(case: DrapeCase) -> float:
+    """Largest distance in height of the two nodes of a crossing [mm]."""
+    return 0.0 if case.weave is None else case.weave.crimp_mm
+
+
+def check(case: DrapeCase) -> None:
+    """Lay out the sheet, whatever the weave: its pattern may be in a file."""
+    weave = case.weave and case.weave.model_copy(update={"pattern": "plain", "stitches": []})
+    flat_sheet(case.model_copy(update={"weave": weave}), Path())
+
+
+def read_files(case: DrapeCase, base: Path) -> None:
+    """Read the file of the punch."""
+    from ..geometry.triangles import read_stl
+
+    if case.punch_stl is not None:
+        read_stl(base / case.punch_stl)
 
 
 def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
@@ -53,6 +169,10 @@ def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
     Raises:
         InputError: the file of the punch cannot be read or is no surface with two sides.
     """
+    from ..geometry.distance import DistanceGrid
+    from ..geometry.triangles import read_stl
+    from ..mechanics.tools import HoledPlate, Mould, Sphere
+
     shape = None if case.punch_stl is None else read_stl(base / case.punch_stl)
     top = case.punch_radius_mm if shape is None else -float(shape.points[:, 2].min())
     speed = case.punch_travel_mm / case.duration_s
@@ -87,6 +207,8 @@ def pressed(case: DrapeCase) -> dict[str, Callable[[float], float]]:
 
 def symmetry_planes(net: Net) -> list[Support]:
     """Nodes on x = 0 stay in that plane and turn about its normal only; likewise y = 0."""
+    from ..solving.model import Support
+
     planes = []
     for axis, held in ((0, (0, 4, 5)), (1, (1, 3, 5))):
         nodes = np.flatnonzero(np.abs(net.points[:, axis]) < 1e-9 * np.ptp(net.points))
@@ -96,6 +218,8 @@ def symmetry_planes(net: Net) -> list[Support]:
 
 def contact_law(keys: ContactKeys) -> ContactLaw:
     """Pressure and friction law of the case."""
+    from ..solving.parts import ContactLaw
+
     return ContactLaw(
         keys.stiffness_N_mm2,
         keys.layer_mm,
@@ -107,6 +231,9 @@ def contact_law(keys: ContactKeys) -> ContactLaw:
 
 def build(case: DrapeCase, session: Session) -> Model:
     """The model of a drape case. Collective."""
+    from ..solving.generalised_alpha import GeneralisedAlpha
+    from .common import fabric_model, tow_net
+
     keys, weave = case.sheet, case.weave
     net = tow_net(case, flat_sheet(case, session.base), session, crossing_gap=crossing_gap(case))
     return fabric_model(
@@ -157,6 +284,8 @@ def run(case: DrapeCase, session: Session) -> dict[str, Any]:
     Returns:
         The content of result.json.
     """
+    from .common import control, simulated
+
     model = build(case, session)
 
     def measure(snapshot: Snapshot) -> dict[str, float]:
@@ -165,35 +294,30 @@ def run(case: DrapeCase, session: Session) -> dict[str, Any]:
             "holder_height_mm": float(model.tool_place("holder")[2]),
         }
 
-    outcome = simulate(
+    outcome = simulated(
+        case,
         model,
-        session.folder,
-        test="drape",
+        session,
         end=case.duration_s,
         control=control(case.solver, case.edge_radius_mm / 2.0),
-        force_tolerance=case.solver.force_tolerance_N,
-        iteration_limit=case.solver.iteration_limit,
         measure=measure,
-        progress=lambda time, step, its: session.progress(time / case.duration_s, step, its),
-        resume=session.resume,
-        case_text=session.case_text,
-        started=session.started,
     )
     return report(case, session, model, outcome)
 
 
 def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dict[str, Any]:
     """Tables, pictures and quantities of the last accepted step."""
+    from .common import extend, lowest
+
     quantities: dict[str, Any] = {}
     snapshot, net = outcome.last, model.net
     if snapshot is not None:
         _write_crossings(session, net, snapshot)
         row = outcome.rows[-1]
-        parts = 4.0 if case.symmetry == "quarter" else 1.0
         quantities = {
             "punch_depth_mm": case.punch_travel_mm * snapshot.time / case.duration_s,
-            "punch_force_N": -row["punch_force_z_N"] * parts,
-            "holder_force_N": -row["holder_force_z_N"] * parts,
+            "punch_force_N": -row["punch_force_z_N"],
+            "holder_force_N": -row["holder_force_z_N"],
             "holder_height_mm": row["holder_height_mm"],
             "largest_shear_angle_deg": row["largest_shear_deg"],
             "lowest_point_mm": lowest(net, snapshot.displacement),
@@ -224,6 +348,8 @@ def _kinetic_share(rows: list[dict[str, float]]) -> float:
 
 
 def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
+    from .common import write_table
+
     flat = net.points[net.crossings].mean(axis=1)
     now = flat + snapshot.displacement[net.crossings].mean(axis=1)
     columns = {"x0_mm": flat[:, 0], "y0_mm": flat[:, 1]}
@@ -233,6 +359,9 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
 
 
 def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -> None:
+    from ..output.pictures import draw_net
+    from ..output.surfaces import tool_surface
+
     extent = 0.62 * max(case.sheet.width_mm, case.sheet.length_mm)
     surfaces = [tool_surface(tool, extent, model.tool_place(tool.name)) for tool in model.tools]
     depth = case.punch_travel_mm * snapshot.time / case.duration_s
@@ -249,3 +378,16 @@ def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -
             title=f"punch at {depth:.0f} mm",
             mirror=case.symmetry == "quarter",
         )
+
+
+RIG = Rig(
+    case=DrapeCase,
+    fabrics=fabrics,
+    run=run,
+    check=check,
+    read_files=read_files,
+    crossing_gap=crossing_gap,
+    quarter=lambda case: case.symmetry == "quarter",
+    steps=lambda case: 1.25 * case.duration_s / case.solver.largest_step_s,
+    iterations=4.0,
+)

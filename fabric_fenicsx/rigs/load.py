@@ -17,8 +17,9 @@ from ..inputs.validation import (
     read_yaml,
     suggestion,
 )
-from .cases import CASES, Case, DrapeCase
-from .fabrics import fabrics, flat_sheet
+from .cases import Case
+from .registry import RIGS, rig
+from .rig import Rig
 
 __all__ = ["load_case"]
 
@@ -44,14 +45,14 @@ def load_case(path: Path, settings: Sequence[str] = ()) -> Case:
         raise InputError(f"{path}: {what}, allowed is a mapping of keys with test: {_tests()}")
     changed = [_apply(data, setting) for setting in settings]
     test = data.get("test")
-    if not isinstance(test, str) or test not in CASES:
-        close = suggestion(test, CASES) if isinstance(test, str) else ""
+    if not isinstance(test, str) or test not in RIGS:
+        close = suggestion(test, RIGS) if isinstance(test, str) else ""
         shown = f"{plain(test)}{close}" if "test" in data else "missing"
         origin = OPTION if ("test",) in changed else path
         raise InputError(one_line(f"{origin}: test: {shown}, allowed is {_tests()}"))
-    model = CASES[test]
-    case, problems = mistakes(model, data, path.parent)
-    if not problems and (reason := _no_sheet(case)):
+    found = rig(test)
+    case, problems = mistakes(found.case, data, path.parent)
+    if not problems and (reason := _no_sheet(found, case)):
         problems = [((), reason)]
     if problems:
         place, text = problems[0]
@@ -105,18 +106,17 @@ def _step(group: Any, part: str, place: list[str | int], dotted: str) -> str | i
     return int(part)
 
 
-def _no_sheet(case: Case) -> str | None:
+def _no_sheet(found: Rig[Any], case: Case) -> str | None:
     """Why there is no such sheet, if the spacing of the tows does not fit into it."""
     try:
-        if isinstance(case, DrapeCase):
-            # A weave's own files count from the case's folder: they are read when it is run.
-            flat_sheet(case.model_copy(update={"weave": None}), Path())
+        if found.check is None:
+            found.fabrics(case, Path())
         else:
-            fabrics(case, Path())
-    except ValueError as error:
+            found.check(case)
+    except (ValueError, InputError) as error:
         return str(error)
     return None
 
 
 def _tests() -> str:
-    return one_of(list(CASES))
+    return one_of(RIGS)

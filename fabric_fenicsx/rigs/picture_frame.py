@@ -9,24 +9,77 @@ The woven square lies in the middle; outside of it the tows run on to the bars w
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field, model_validator
 
 from ..fabric.net import Net
-from ..output.files import replacing
-from ..output.pictures import draw_net
-from ..solving.model import Model, Support
-from ..solving.snapshot import Snapshot
-from .cases import PictureFrameCase
-from .common import Session, control, extend, fabric_model, tow_net, write_table
-from .fabrics import woven_sheet
-from .simulation import simulate
+from ..fabric.paths import TowPaths
+from ..fabric.sheet import Sheet
+from ..inputs.groups import NotNegative, Positive
+from .cases import PlainWeaveCase
+from .rig import Rig
 
-__all__ = ["build", "crosshead", "frame_angle", "frame_ends", "normalised_force", "run"]
+if TYPE_CHECKING:
+    from ..solving.model import Model, Support
+    from ..solving.snapshot import Snapshot
+    from .common import Session
+
+__all__ = [
+    "RIG",
+    "PictureFrameCase",
+    "build",
+    "crosshead",
+    "frame_angle",
+    "frame_ends",
+    "normalised_force",
+    "run",
+    "woven_sheet",
+]
 
 Array = npt.NDArray[np.float64]
+
+
+class PictureFrameCase(PlainWeaveCase):
+    """A hinged square frame shears the fabric whose tows are pinned to its bars."""
+
+    test: Literal["picture_frame"]
+    frame_length_mm: Positive = Field(192.0, description="L_frame, between the hinges of a bar")
+    fabric_length_mm: Positive = Field(96.0, description="L_fabric, side of the woven square")
+    rate_mm_min: Positive = Field(35.0, description="speed of the crosshead")
+    travel_mm: Positive = Field(94.7, description="of the crosshead; 94.7 mm is 55 degrees")
+    hold_s: NotNegative = Field(180.0, description="time at rest before the way back")
+    unload: bool = Field(True, description="move back to the square")
+
+    @model_validator(mode="after")
+    def _fits(self) -> PictureFrameCase:
+        if self.fabric_length_mm > self.frame_length_mm:
+            raise ValueError("fabric_length_mm: at most frame_length_mm")
+        if self.travel_mm >= (2.0 - 2.0**0.5) * self.frame_length_mm:
+            raise ValueError("travel_mm: less than (2 - sqrt 2) frame_length_mm, the closed frame")
+        return self
+
+
+def woven_sheet(case: PictureFrameCase) -> Sheet:
+    """Tows over the whole frame, crossing in the square of side L_fabric in its middle."""
+    frame, fabric = case.frame_length_mm, case.fabric_length_mm
+    middle = ((frame - fabric) / 2.0, (frame + fabric) / 2.0)
+    woven = case.woven(middle, middle)
+    return Sheet(
+        (0.0, frame),
+        (0.0, frame),
+        woven.warp_positions,
+        woven.weft_positions,
+        subdivisions=case.subdivisions,
+    )
+
+
+def fabrics(case: PictureFrameCase, base: Path) -> dict[str, TowPaths]:
+    """The one sheet."""
+    return {"sheet": woven_sheet(case)}
 
 
 def frame_angle(displacement: Any, frame_length: float) -> Any:
@@ -66,6 +119,8 @@ def directions(gamma: float) -> tuple[Array, Array]:
 
 def frame_ends(net: Net, case: PictureFrameCase, place: Any = crosshead) -> Support:
     """The tow ends on the bars, moved affinely by the crosshead ``place(case, time)``."""
+    from ..solving.model import Support
+
     nodes = net.ends.ravel()
     X = net.points[nodes]
 
@@ -78,11 +133,13 @@ def frame_ends(net: Net, case: PictureFrameCase, place: Any = crosshead) -> Supp
 
 def build(case: PictureFrameCase, session: Session) -> Model:
     """The model of a picture frame. Collective."""
+    from .common import fabric_model, tow_net
+
     net = tow_net(case, woven_sheet(case), session)
     return fabric_model(
         case,
         net,
-        (case.warp_spacing_mm, case.weft_spacing_mm),
+        case.spacings,
         session,
         viscosity=case.tow.relaxation_time_s,
         supports=[frame_ends(net, case)],
@@ -109,6 +166,8 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
     Returns:
         The content of result.json.
     """
+    from .common import control, extend, simulated, write_table
+
     model = build(case, session)
     frame, fabric = case.frame_length_mm, case.fabric_length_mm
     end = duration(case)
@@ -127,25 +186,18 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
 
     out = 60.0 * case.travel_mm / case.rate_mm_min
     turns = (out, out + case.hold_s) if case.hold_s else (out,)
-    outcome = simulate(
+    outcome = simulated(
+        case,
         model,
-        session.folder,
-        test="picture_frame",
+        session,
         end=end,
         stops=[t for t in turns if t < end],
         control=control(case.solver),
-        force_tolerance=case.solver.force_tolerance_N,
-        iteration_limit=case.solver.iteration_limit,
         measure=measure,
-        progress=lambda time, step, its: session.progress(time / end, step, its),
-        resume=session.resume,
-        case_text=session.case_text,
-        started=session.started,
     )
     rows = outcome.rows
-    names = ("displacement_mm", "force_N", "shear_angle_deg", "normalised_force_N_mm")
-    columns = {"time_s": np.array([row["time_s"] for row in rows])}
-    columns |= {name: np.array([row[name] for row in rows]) for name in names}
+    names = ("time_s", "displacement_mm", "force_N", "shear_angle_deg", "normalised_force_N_mm")
+    columns = {name: np.array([row[name] for row in rows]) for name in names}
     write_table(session, "curve.csv", columns)
     quantities: dict[str, Any] = {}
     if outcome.last is not None:
@@ -164,6 +216,9 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
 def _draw(session: Session, model: Model, last: Snapshot, columns: dict[str, Array]) -> None:
     from matplotlib.figure import Figure
 
+    from ..output.files import replacing
+    from ..output.pictures import draw_net
+
     draw_net(session.folder / "picture_frame.png", model.net, last, view="top")
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     against_angle, against_time = figure.subplots(1, 2)
@@ -176,3 +231,12 @@ def _draw(session: Session, model: Model, last: Snapshot, columns: dict[str, Arr
         axes.grid(alpha=0.3)
     with replacing(session.folder / "curve.png") as path:
         figure.savefig(path, dpi=150)
+
+
+RIG = Rig(
+    case=PictureFrameCase,
+    fabrics=fabrics,
+    run=run,
+    steps=lambda case: 1.1 * duration(case) / case.solver.largest_step_s,
+    iterations=1.4,
+)

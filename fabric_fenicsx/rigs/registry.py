@@ -1,16 +1,34 @@
-"""What runs each test."""
+"""The rigs. Each is a file of this folder with a `RIG`, imported when a case asks for it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from . import cantilever, drape, picture_frame
+from ..errors import InputError
 
-__all__ = ["RUNNERS"]
+if TYPE_CHECKING:
+    from .rig import Rig
 
-RUNNERS: dict[str, Callable[..., dict[str, Any]]] = {
-    "drape": drape.run,
-    "picture_frame": picture_frame.run,
-    "cantilever": cantilever.run,
-}
+__all__ = ["RIGS", "rig"]
+
+RIGS = (
+    "drape",
+    "picture_frame",
+    "cantilever",
+)
+"""Their names, which are those of their files and what `test` says in a case."""
+
+
+def rig(name: str) -> Rig[Any]:
+    """The rig of a name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if name not in RIGS:
+        from ..inputs.keys import one_of
+
+        raise InputError(f"test: {name}, allowed is {one_of(RIGS)}")
+    found: Rig[Any] = import_module(f".{name}", __package__).RIG
+    return found

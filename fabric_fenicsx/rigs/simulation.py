@@ -10,6 +10,7 @@ from typing import Any
 
 from .. import _dolfinx
 from ..errors import InputError, SolveError
+from ..output.folder import prepare_folder
 from ..output.record import Record, load_state
 from ..solving.model import Model
 from ..solving.snapshot import Snapshot
@@ -43,27 +44,28 @@ def simulate(
     model: Model,
     folder: Path,
     *,
-    test: str,
     end: float,
-    stops: Sequence[float] = (),
     control: StepControl,
-    force_tolerance: float,
+    test: str = "model",
+    stops: Sequence[float] = (),
+    force_tolerance: float = 1e-4,
     iteration_limit: int = 20,
     measure: Callable[[Snapshot], dict[str, float]] = lambda snapshot: {},
     progress: Callable[[float, int, int], None] = lambda time, step, iterations: None,
     resume: bool = False,
     case_text: str | None = None,
     started: float | None = None,
+    quarter: bool = False,
 ) -> Run:
     """Run a model to its end, or as far as it goes. Collective.
 
     Args:
         model: what to run.
-        folder: where records go; it must exist.
-        test: name of the rig.
+        folder: where records go; is made.
         end: final time [s].
-        stops: times that steps must not jump over (where a prescribed motion has a corner) [s].
         control: step lengths.
+        test: name of the rig.
+        stops: times that steps must not jump over (where a prescribed motion has a corner) [s].
         force_tolerance: residual norm at which a step is in balance [N, N mm].
         iteration_limit: Newton iterations after which a step has failed.
         measure: further columns for each step's row, from its snapshot.
@@ -71,13 +73,16 @@ def simulate(
         resume: go on from the last step file in the folder.
         case_text: the case as YAML, to be kept beside the records.
         started: perf_counter() at the start of the command, for the total seconds.
+        quarter: whether the model is the part x >= 0, y >= 0 of a symmetric sheet; forces and
+            energies of the rows are of the whole one.
 
     Returns:
         The run; ``completed`` is False where the step control gave up.
 
     Raises:
-        InputError: there is nothing to resume.
+        InputError: the folder cannot be written, or there is nothing to resume.
     """
+    prepare_folder(folder, model.comm)
     started = perf_counter() if started is None else started
     newton = model.newton(force_tolerance=force_tolerance, limit=iteration_limit)
     stepper = Stepper(model, newton, control)
@@ -89,7 +94,7 @@ def simulate(
         if stepper.state.time >= end * (1.0 - 1e-12):
             raise InputError(f"{folder}: the run is complete, there is nothing to resume")
     resume_at = stepper.state.time if resume else None
-    record = Record(folder, model, resume_at=resume_at, case_text=case_text)
+    record = Record(folder, model, resume_at=resume_at, case_text=case_text, quarter=quarter)
 
     last: list[Snapshot] = []
 

@@ -13,7 +13,8 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from ..inputs.keys import allowed_by, group_of, unit, variants
-from .cases import CASES, Case
+from .cases import Case
+from .registry import rig
 
 __all__ = ["case_text", "template"]
 
@@ -47,18 +48,18 @@ def _absolute(value: Any, base: Path) -> Any:
     return value
 
 
-def template(rig: str) -> str:
+def template(name: str) -> str:
     """A case file of a rig with every key at its default, its meaning beside it.
 
     Keys without a value of their own, such as files and lists, stand there as comments.
 
     Args:
-        rig: a key of CASES.
+        name: of the rig.
 
     Returns:
         YAML that `load_case` accepts as it is.
     """
-    model = CASES[rig]
+    model = rig(name).case
     about = " ".join((model.__doc__ or "").split())
     head = [*_comment(about, 0), *_comment("Values are the defaults: delete what stays so.", 0)]
     return "\n".join([*head, *_group(model, 0)]) + "\n"

@@ -9,6 +9,10 @@ weight exactly, losses with the force at the end of the step. The remainder is t
 of the time integration and the error of these sums; both vanish with the step. Impulses are summed
 likewise, the force of the first step being that at its end; a run starts at rest. Momentum and
 impulse are about the origin, see solving.momentum.
+
+All is of the whole sheet, also where a quarter of it is modelled: its images in x = 0 and y = 0
+carry the same work and energy, and of the sum of a force and its images only z is left, of a moment
+nothing.
 """
 
 from __future__ import annotations
@@ -30,10 +34,15 @@ class Balance:
     Args:
         model: what is run.
         past: columns of the last recorded step, to go on from; None at the start.
+        quarter: whether it is the part x >= 0, y >= 0 of a symmetric sheet.
     """
 
-    def __init__(self, model: Model, past: dict[str, float] | None = None) -> None:
+    def __init__(
+        self, model: Model, past: dict[str, float] | None = None, *, quarter: bool = False
+    ) -> None:
         self.model = model
+        self._parts = 4.0 if quarter else 1.0
+        self._whole = np.array([0.0, 0.0, 4.0, 0.0, 0.0, 0.0]) if quarter else np.ones(6)
         past = past or {}
         self.external = past.get("external_work_N_mm", 0.0)
         self.lost = past.get("lost_N_mm", 0.0)
@@ -56,17 +65,16 @@ class Balance:
         row: dict[str, float] = {}
         forces = model.tool_forces()
         for tool in model.tools:
-            force = forces[tool.name]
+            force = forces[tool.name] * self._whole[:3] + 0.0
             place = model.tool_place(tool.name)
             moved = place - self._tool_place[tool.name]
             self.external += float((force + self._tool_force[tool.name]) @ moved) / 2.0
             self._tool_force[tool.name], self._tool_place[tool.name] = force, place
             row |= {f"{tool.name}_force_{a}_N": float(f) for a, f in zip("xyz", force, strict=True)}
-        self.external += model.weight_work() + self._support_work()
+        self.external += self._parts * (model.weight_work() + self._support_work())
 
-        energies = model.system.energies()
-        losses = model.system.losses()
-        self.lost += sum(losses.values())
+        energies = {name: self._parts * e for name, e in model.system.energies().items()}
+        self.lost += self._parts * sum(model.system.losses().values())
         kinetic = energies.get("inertia", 0.0)
         stored = sum(energies.values()) - kinetic
         row |= {f"energy_{name.replace(' ', '_')}_N_mm": e for name, e in energies.items()}
@@ -86,13 +94,12 @@ class Balance:
         """Momentum, impulse and what acts from outside; nothing in statics."""
         if self._momentum is None:
             return {}
-        wrench = self._momentum.external()
+        wrench = self._momentum.external() * self._whole + 0.0
         before = wrench if self._wrench is None else self._wrench
         self._impulse += (before + wrench) / 2.0 * (time - self._time)
         self._wrench, self._time = wrench, time
-        columns = _columns(
-            self._momentum.momentum(), "momentum_{}_N_s", "angular_momentum_{}_N_mm_s"
-        )
+        momentum = self._momentum.momentum() * self._whole + 0.0
+        columns = _columns(momentum, "momentum_{}_N_s", "angular_momentum_{}_N_mm_s")
         columns |= _columns(self._impulse, "impulse_{}_N_s", "angular_impulse_{}_N_mm_s")
         return columns | _columns(wrench, "external_force_{}_N", "external_moment_{}_N_mm")
 

@@ -98,6 +98,8 @@ class Discretisation:
             mass=self.cell_field(cells[4], mass),
             section_forces=Function(cells[6]),
             strain_n=Function(cells[6]),
+            strain_before=Function(cells[6]),
+            strain_star=Function(cells[6]),
             rate_star=Function(space),
             acceleration_star=Function(space),
         )
@@ -165,6 +167,7 @@ class Discretisation:
         vectors = _dolfinx.constants_per_cell(mesh, 3)
         numbers = _dolfinx.constants_per_cell(mesh, 1)
         directions = self._crossing_directions()
+        offset = net.points[net.crossings[:, 1]] - net.points[net.crossings[:, 0]]
         return ConnectorFields(
             mesh=mesh,
             space=space,
@@ -177,6 +180,7 @@ class Discretisation:
             angle_0=self.crossing_field(numbers, reference_angle(net)),
             interlacing=self.crossing_field(numbers, self.interlacing),
             patch=self.crossing_field(numbers, self.patch),
+            offset=self.crossing_field(vectors, offset) if offset.any() else None,
         )
 
     def nodal_directions(self) -> dict[str, Array]:

@@ -21,7 +21,7 @@ from ..mechanics.section_laws import with_viscosity
 from ..mechanics.terms import Term, work_term
 from ..mechanics.tools import Tool
 from .discretisation import BLOCK, Discretisation
-from .generalised_alpha import GeneralisedAlpha
+from .generalised_alpha import GeneralisedAlpha, backward_difference
 from .history import Histories
 from .newton import Newton
 from .parts import ContactLaw, Contacts, Crossings, CrossoverLaw
@@ -33,6 +33,9 @@ from .update import rotate
 __all__ = ["Model", "Support"]
 
 Array = npt.NDArray[np.float64]
+
+#: Linear rate of Newton's convergence up to which half the cost of a factorisation is worth it.
+NEGLIGIBLE_RATE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +112,8 @@ class Model:
         kind = (net.tow_family if tow_section is None else tow_section)[net.cell_tow]
         stiffness = diagonals(sections)[kind]
         mass = self.mass = np.array([s.mass() for s in sections])[kind]
+        # Softest of twist and bending over the cell length squared [N].
+        self._bending = stiffness[:, 3:].min(axis=1) / net.lengths**2
         self.net, self.comm = net, comm
         self.time = 0.0
         self._supports = list(supports)
@@ -120,6 +125,8 @@ class Model:
         self._constants(mass_scale)
         self.histories = Histories(self.disc)
         self.histories.add("strain", "cells", self.fields.strain_n, beam.strain(self.fields))
+        before = self.fields.strain_before
+        self.histories.add("strain before", "cells", before, self.fields.strain_n)
 
         terms = self._tow_terms()
         self.crossings: Crossings | None = None
@@ -170,7 +177,7 @@ class Model:
         if self.alpha is not None:
             work = inertia.inertia(tows, self.c_0, self.c_1, self.mass_scale)
             kinetic = inertia.kinetic_energy(tows, self.c_1, self.mass_scale)
-            # Unsymmetric is only what the tiny rotary inertia of a turning section does.
+            # Not that of a section that turns fast, see ``set_rates``.
             terms.append(work_term("inertia", tows, work, energy=kinetic, symmetric=True))
         return terms
 
@@ -218,11 +225,22 @@ class Model:
             values[part] = wanted - u[self._place[support.nodes[own]], component]
         return values
 
-    def set_time(self, start: float, end: float) -> None:
-        """Move the tools to their places at the end of the step and set what depends on Δt."""
+    def set_time(self, start: float, end: float, last: float = 0.0) -> None:
+        """Move the tools to their places at the end of the step and set what depends on Δt.
+
+        Args:
+            start: of the step [s].
+            end: of the step [s].
+            last: length of the step before [s]; 0 where strain rates are to be backward differences
+                over this step alone.
+        """
         self.time = start
         self.set_load(end)
-        self.relaxation.value = self.viscosity / (end - start)
+        fields, ratio = self.fields, (end - start) / last if last else 0.0
+        factor, extrapolated = backward_difference(ratio)
+        self.relaxation.value = factor * self.viscosity / (end - start)
+        now, before = (field.x.array for field in (fields.strain_n, fields.strain_before))
+        fields.strain_star.x.array[:] = now + extrapolated * (now - before)
         if self.crossings is not None:
             self.crossings.set_step(end - start)
         if self.contacts is not None:
@@ -257,9 +275,22 @@ class Model:
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
         return np.concatenate(nodes), np.concatenate(components)
 
-    def set_rates(self, c_0: float, c_1: float) -> None:
-        """Constants of the time integration for this step."""
+    def set_rates(self, c_0: float, c_1: float, turn: float = 0.0) -> None:
+        """Constants of the time integration for this step.
+
+        In a step that turns nodes by θ, rotary inertia has an unsymmetric part of c_0 J θ beside
+        the tangent's c_0 J + C_K/h². What a symmetric factorisation leaves out of it makes Newton
+        linear, with the ratio of the two as its rate.
+
+        Args:
+            c_0: of a = c_0 w + a* [1/s²].
+            c_1: of v = c_1 w + v* [1/s].
+            turn: θ, about how far the fastest node turns [rad].
+        """
         self.c_0.value, self.c_1.value = c_0, c_1
+        inertia = c_0 * float(self.mass_scale.value) * self.mass[:, 1:]
+        rate = turn * inertia.max(axis=1) / (inertia.min(axis=1) + self._bending)
+        self.system.gyroscopic = bool(rate.max() > NEGLIGIBLE_RATE)
 
     def remember(self) -> None:
         """Update what the next step starts from, with the increment still in the fields."""

@@ -35,6 +35,7 @@ class State:
         v: velocity [mm/s] and material angular velocity [rad/s], (n, 6).
         vdot: their rates, (n, 6).
         a: the method's auxiliary accelerations, (n, 6).
+        last_step: length of the step that led here [s]; 0 at the start.
         next_step: what the step control proposes [s]; 0 before the first.
     """
 
@@ -42,6 +43,7 @@ class State:
     v: Array
     vdot: Array
     a: Array
+    last_step: float = 0.0
     next_step: float = 0.0
 
 
@@ -171,8 +173,9 @@ class Stepper:
         """Give the start the acceleration that its forces ask for: M v̇ = f at t = 0. Collective.
 
         Without it a run starts with v̇ = 0 and the method has to find the acceleration in its
-        first steps, which costs an order. To be left out where a run starts far from balance, as
-        with tools that overlap the sheet, and the first steps shall damp that away.
+        first steps, which costs an order. Drapes leave it out: their weight acts from one moment to
+        the next, and started in free fall the demo's sheet has a kinetic energy of 0.19 of the
+        stored one instead of 3e-4, while the angles at its end are the same to 0.01 degrees.
         """
         if self.alpha is None:
             return
@@ -197,6 +200,12 @@ class Stepper:
         self.state.vdot = acceleration[net.local_nodes]
         self.state.a = self.state.vdot.copy()
 
+    def _turn(self, h: float) -> float:
+        """About how far the fastest node turns in a step [rad]."""
+        spin = (self.state.v + h * self.state.vdot)[: self.net.owned, 3:]
+        own = h * float(np.sqrt((spin**2).sum(axis=1).max(initial=0.0)))
+        return float(self.net.comm.allreduce(own, op=MPI.MAX))
+
     def _largest_move(self) -> float:
         """Length of the longest displacement increment of any node [mm]."""
         w = self.net.tows.w.x.array.reshape(-1, 6)[: self.net.owned, :3]
@@ -206,9 +215,10 @@ class Stepper:
     def try_step(self, h: float) -> Outcome:
         """Attempt a step of length h from the accepted state."""
         net, state, model = self.net, self.state, self.model
-        model.set_time(state.time, state.time + h)
+        last = 0.0 if self.alpha is None else state.last_step
+        model.set_time(state.time, state.time + h, last)
         if self.alpha is not None:
-            model.set_rates(*self.alpha.rates(h))
+            model.set_rates(*self.alpha.rates(h), self._turn(h))
             v_star, a_star, _ = self._known_rates(self.alpha, h)
             net.tows.rate_star.x.array[:] = v_star.ravel()
             net.tows.acceleration_star.x.array[:] = a_star.ravel()
@@ -226,15 +236,18 @@ class Stepper:
             state.v, state.vdot, state.a = c_1 * w + v_star, c_0 * w + a_star, a
         self.predictor.learn(h, w)
         state.time += h
+        state.last_step = h
         self.net.everywhere(advance_fields)
 
     def _known_rates(self, m: GeneralisedAlpha, h: float) -> tuple[Array, Array, Array]:
         """v*, a* and the part of w known before the step, h v_n + (1/2 − β) h² a_n."""
         s = self.state
         c_0, c_1 = m.rates(h)
-        drift = h * s.v + (0.5 - m.beta) * h**2 * s.a
-        v_star = s.v + (1.0 - m.gamma) * h * s.a - c_1 * drift
-        a_star = (m.alpha_m * s.a - m.alpha_f * s.vdot) / (1.0 - m.alpha_f) - c_0 * drift
+        # a belongs to t + (α_m − α_f) h, and so to another time where h changes.
+        a = s.vdot + (h / s.last_step if s.last_step else 1.0) * (s.a - s.vdot)
+        drift = h * s.v + (0.5 - m.beta) * h**2 * a
+        v_star = s.v + (1.0 - m.gamma) * h * a - c_1 * drift
+        a_star = (m.alpha_m * a - m.alpha_f * s.vdot) / (1.0 - m.alpha_f) - c_0 * drift
         return v_star, a_star, drift
 
 

@@ -37,6 +37,7 @@ class System:
     Attributes:
         nodal_loads: dead forces and material moments on each local block, (n_blocks, 6)
             [N, N mm]; ghosts are ignored.
+        gyroscopic: whether what rotary inertia does to the symmetry of the tangent counts.
         assemblies: how many residuals and tangents there were, for benchmarks.
         refresh: called after each new increment, for coefficients that depend on it otherwise than
             through UFL.
@@ -68,6 +69,7 @@ class System:
             linearised_forces(tows, self._dw, net.forces_space, law), net.comm
         )
         self.nodal_loads = np.zeros((len(net.local_nodes), BLOCK))
+        self.gyroscopic = False
         self.refresh: list[Callable[[], None]] = []
         self.assemble_seconds = 0.0
         self.assemblies = {"residual": 0, "tangent": 0}
@@ -104,7 +106,7 @@ class System:
     @property
     def symmetric(self) -> bool:
         """Whether the tangent is symmetric; a moment on a node makes it unsymmetric. Collective."""
-        turning = bool(self.nodal_loads[: self.net.owned, 3:].any())
+        turning = self.gyroscopic or bool(self.nodal_loads[: self.net.owned, 3:].any())
         return self._symmetric and not any(self.net.comm.allgather(turning))
 
     def set_increment(self, x: PETSc.Vec, *, linearise_from: str | None = None) -> None:

@@ -21,10 +21,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from fabric_fenicsx.errors import SolveError
+from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
 from fabric_fenicsx.loop.inference.search import diagnose_test
-from fabric_fenicsx.loop.measurement.reading import read_measurement
-from fabric_fenicsx.loop.registry import experiment_class
+from fabric_fenicsx.loop.kinds import kind_of
 from measurements.sets import sixty
 from measurements.writing import Truth
 
@@ -34,7 +34,7 @@ Picture frames and cantilevers made by a generator that shares no code with the 
 forms and differential equations, `tests/measurements`), diagnosed one by one: every listed effect
 in several forms, pairs, none, effects on no list, rivals, outliers. An answer is right where the
 verdict is, and where each name is, itself or as a rival named with it. `before` and `after` are
-held-out errors over the noise put in; `foretold` is what the fit itself expects of `after`, from
+held-out errors over the noise put in; `expected` is what the fit itself expects of `after`, from
 the uncertainty of its parameters, where whole runs are held out. Written by
 `tests/measurements/table.py --page`.
 """
@@ -44,7 +44,7 @@ the uncertainty of its parameters, where whole runs are held out. Written by
 class Row:
     """One set: `before` and `after` are held-out errors over the noise put in.
 
-    `foretold` is the error that the fit expects there, NaN where no run is held out.
+    `expected` is the error that the fit expects there, NaN where no run is held out.
     """
 
     seed: int
@@ -55,7 +55,7 @@ class Row:
     rivals: dict[str, list[str]]
     before: float
     after: float
-    foretold: float = float("nan")
+    expected: float = float("nan")
 
     @property
     def right(self) -> bool:
@@ -82,7 +82,7 @@ def rows(seeds: list[int], only: str = "") -> Iterator[Row]:
                 truth = recipe(Path(folder) / "set")
                 measurement = read_measurement(Path(folder) / "set")
                 try:
-                    found = diagnose_test(experiment_class(measurement.test)([measurement]))
+                    found = diagnose_test(kind_of(measurement.test).experiment([measurement], ()))
                 except SolveError:
                     nothing = (float("nan"), float("nan"))
                     yield Row(seed, recipe.name, truth, "not fitted", (), {}, *nothing)
@@ -96,14 +96,14 @@ def rows(seeds: list[int], only: str = "") -> Iterator[Row]:
                 found.rivals,
                 found.holdout_before / truth.noise,
                 found.holdout_after / truth.noise,
-                _foretold(found),
+                _expected(found),
             )
 
 
-def _foretold(found: Diagnosis) -> float:
+def _expected(found: Diagnosis) -> float:
     readings = found.experiment.readings
     rows = readings.holdout & readings.usable & ~found.outliers
-    return float(np.hypot(1.0, found.final.doubt(rows))) if rows.any() else float("nan")
+    return float(np.hypot(1.0, found.final.prediction_std(rows))) if rows.any() else float("nan")
 
 
 def line(row: Row) -> str:
@@ -119,7 +119,7 @@ def line(row: Row) -> str:
         ", ".join(rivals),
         f"{row.before:.2f}",
         f"{row.after:.2f}",
-        "" if np.isnan(row.foretold) else f"{row.foretold:.2f}",
+        "" if np.isnan(row.expected) else f"{row.expected:.2f}",
         "right" if row.right else "WRONG",
     )
     return "| " + " | ".join(cells) + " |"
@@ -130,7 +130,7 @@ def summary(table: list[Row]) -> str:
     none = [row for row in table if row.truth.verdict == "no_effect"]
     found = [row for row in table if row.verdict == "effect_found"]
     over = [row for row in found if row.after > 1.15]
-    surprising = [row for row in over if not row.after <= 1.15 * row.foretold]
+    surprising = [row for row in over if not row.after <= 1.15 * row.expected]
     return (
         f"{sum(row.right for row in table)} of {len(table)} right; "
         f"false alarms: {sum(row.alarm for row in none)} of {len(none)}; "
@@ -147,7 +147,7 @@ def main() -> None:
     parser.add_argument("--only", default="")
     parser.add_argument("--page", type=Path)
     given = parser.parse_args()
-    head = "| seed | set | put in | said | rivals | before | after | foretold | |\n|" + "---|" * 9
+    head = "| seed | set | put in | said | rivals | before | after | expected | |\n|" + "---|" * 9
     print(head)
     table = []
     for row in rows(given.seeds, given.only):

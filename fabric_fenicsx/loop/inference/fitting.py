@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from ...errors import SolveError
+from .criteria import CRITERIA
 from .effects import Parameter, Variant
 from .experiment import Experiment, Flags
 
@@ -24,15 +25,13 @@ __all__ = [
 
 Array = npt.NDArray[np.float64]
 
-#: Parameters whose estimates correlate more than this are told in the report.
-CORRELATED = 0.98
 #: Least information about a combination of parameters, as a share of the most: round-off.
 LEAST_KNOWN = 1e-14
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """A fitted model.
+    """A fitted model; two are the same only if they are one object.
 
     Attributes:
         variants: the effects in it.
@@ -40,6 +39,7 @@ class Fit:
         std: their standard errors, for a noise of one unit; see ``errors_at``.
         correlated: pairs of parameters that the data hardly tell apart.
         at_bound: parameters that ended on a bound.
+        converged: false where the search ended at its cap of evaluations.
         residual: observed minus expected at every reading, used or not, (n,).
         expected: the model there, (n,).
         used: readings that were fitted, (n,).
@@ -54,6 +54,7 @@ class Fit:
     std: dict[str, float]
     correlated: tuple[tuple[str, str], ...]
     at_bound: tuple[str, ...]
+    converged: bool
     residual: Array
     expected: Array
     used: npt.NDArray[np.bool_]
@@ -80,8 +81,8 @@ class Fit:
         own = (self.residual * self.weight)[rows]
         return float(np.sqrt(np.mean(own**2))) if len(own) else float("nan")
 
-    def foreseen(self, rows: Flags) -> float:
-        """Root mean square of the weighted residual there, in units that prediction allows for.
+    def predictive_rms(self, rows: Flags) -> float:
+        """Root mean square of the weighted residual there, less what the prediction allows for.
 
         A prediction is as uncertain as the parameters it is made with, and its errors go together:
         with G Gᵀ the covariance of what is expected, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum
@@ -94,8 +95,8 @@ class Fit:
         allowed = float(np.sum((along.T @ r) ** 2 / (1.0 + 1.0 / np.maximum(size, 1e-150) ** 2)))
         return float(np.sqrt(max(float(r @ r) - allowed, 0.0) / len(r)))
 
-    def doubt(self, rows: Flags) -> float:
-        """Root mean square error of the expected readings there, for a noise of one unit."""
+    def prediction_std(self, rows: Flags) -> float:
+        """Standard error of the expected readings there, rms, for a noise of one unit."""
         return float(np.sqrt(np.mean(np.sum((self.slopes[rows] @ self.root) ** 2, axis=1))))
 
     def error_of(self, slopes: Mapping[str, Array], noise: float) -> Array:
@@ -125,7 +126,7 @@ def fit(
     start: Mapping[str, float],
     used: npt.NDArray[np.bool_],
     *,
-    evaluations: int = 60,
+    evaluations: int = CRITERIA.evaluations,
     robust: float | None = None,
 ) -> Fit:
     """Fit a model to some readings.
@@ -194,13 +195,14 @@ def fit(
         raise SolveError(f"a derivative in {', '.join(names)} is not finite at the fit")
     std, correlation, root = _uncertainty(J)
     every = np.column_stack([model(result.x)[1][name] * readings.weight for name in names])
-    near = np.triu(np.abs(correlation) > CORRELATED, 1)
+    near = np.triu(np.abs(correlation) > CRITERIA.correlated, 1)
     return Fit(
         variants=tuple(variants),
         values=dict(zip(names, result.x.tolist(), strict=True)),
         std=dict(zip(names, std.tolist(), strict=True)),
         correlated=tuple((names[i], names[j]) for i, j in np.argwhere(near)),
         at_bound=tuple(np.array(names)[result.active_mask != 0].tolist()),
+        converged=result.status > 0,
         residual=readings.observed - expected,
         expected=expected,
         used=used,
@@ -222,6 +224,7 @@ def _without_parameters(
         std={},
         correlated=(),
         at_bound=(),
+        converged=True,
         residual=readings.observed - expected,
         expected=expected,
         used=used,

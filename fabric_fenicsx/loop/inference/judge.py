@@ -1,46 +1,45 @@
 """When a model explains the data: noise in what was fitted, and the held-out error near the noise.
 
-A prediction is as uncertain as the parameters it is made with: what is foreseen is judged by
-r · (1 + G Gᵀ)⁻¹ r (see Fit.foreseen), what is reported is the error itself.
+A prediction is as uncertain as the parameters it is made with: what was held out is judged by
+r · (1 + G Gᵀ)⁻¹ r (see Fit.predictive_rms), what is reported is the error itself.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
 from ...errors import SolveError
+from .criteria import CRITERIA
 from .effects import Variant
 from .experiment import Experiment
 from .fitting import Fit, fit, soft_size
-from .noise import Whiteness, estimated_noise, lone, spikes, whiteness
+from .noise import Whiteness, estimated_noise, missed_readings, outliers, whiteness
 
-__all__ = ["FAR", "STATED", "Judge", "has_own"]
+__all__ = ["CrossValidation", "Judge", "has_own"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-#: Sigmas beyond which a reading pulls a fit less: it may be wrong, or lie beyond a corner of a law
-#: that the fit has not reached, where least squares would stay.
-FAR = 3.0
-#: Held-out error over noise up to which a model explains the data.
-NEAR = 1.15
-#: Share of the baseline's held-out error that may be left where a prediction is in doubt.
-MUCH = 0.25
-#: Scatter over noise up to which a residual without structure is noise: nobody knows that better.
-STATED = 1.25
-#: ... and with some.
-SOME = 1.1
-#: Probability below which no size of a residual excuses its structure.
-HOPELESS = 1e-8
-#: Share of the range that a reading is good to where no noise is given.
-READ = 0.005
-#: Contiguous blocks that are left out in turn where there is one run.
-BLOCKS = 5
+
+@dataclass(frozen=True, slots=True)
+class CrossValidation:
+    """How well parts of the fitted readings are predicted from the others.
+
+    Attributes:
+        error: root mean square; NaN where no part could be predicted.
+        parts: that were left out in turn.
+        failed: those of them that could not be predicted: too few readings are left, or the model
+            has no solution there.
+    """
+
+    error: float
+    parts: int
+    failed: int
 
 
 class Judge:
@@ -60,9 +59,7 @@ class Judge:
         self.outliers: Flags = np.zeros(len(self._readings.observed), dtype=bool)
         self.given = experiment.noise is not None
         self.noise = float("nan") if experiment.noise is None else experiment.noise
-        self._validated: dict[int, float] = {}
-        # Their ids stay theirs as long as they live.
-        self._kept: list[Fit] = []
+        self._validated: dict[Fit, CrossValidation] = {}
 
     @property
     def rows(self) -> Flags:
@@ -80,8 +77,8 @@ class Judge:
         What stood out from a lesser model may be just what the better one explains.
         """
         rows = self._readings.usable
-        found = spikes(model.residual, self._readings, rows)
-        found |= lone(model.residual, self._readings, rows & ~found)
+        found = outliers(model.residual, self._readings, rows)
+        found |= missed_readings(model.residual, self._readings, rows & ~found)
         changed = bool((found != self.outliers).any())
         self.outliers = found
         return changed
@@ -91,12 +88,14 @@ class Judge:
         if not self.given:
             self.noise = estimated_noise(model.residual, self._readings, self.rows)
 
-    def criterion(self, model: Fit | None, noise: float | None = None) -> float:
-        """χ² + k ln n; smaller is better. Residuals beyond a limit count by their size only."""
+    def bic(self, model: Fit | None, noise: float | None = None) -> float:
+        """χ² + k ln n (Schwarz); smaller is better. Residuals far off count by their size only."""
         if model is None:
             return float("inf")
         z = (model.residual * model.weight)[model.used] / (noise or self.noise)
-        return soft_size(z, FAR) + len(model.values) * float(np.log(max(model.used.sum(), 2)))
+        return soft_size(z, CRITERIA.far) + len(model.values) * float(
+            np.log(max(model.used.sum(), 2))
+        )
 
     def whiteness(self, model: Fit) -> Whiteness:
         """Tests of what a model leaves in the fitted readings."""
@@ -108,10 +107,10 @@ class Judge:
         """Whether a model leaves noise, in size, on what was fitted."""
         white = self.whiteness(model)
         # Of an estimated noise the means over stretches may be too large by themselves.
-        if min(white.lags, white.period, white.blocks if self.given else 1.0) < HOPELESS:
+        if min(white.lags, white.period, white.blocks if self.given else 1.0) < CRITERIA.hopeless_p:
             return False
-        scatter = np.sqrt(model.sum_of_squares / model.freedom) / self.near
-        allowed = SOME if white.structured else STATED
+        scatter = np.sqrt(model.sum_of_squares / model.freedom) / self.accuracy
+        allowed = CRITERIA.scatter_with_structure if white.structured else CRITERIA.scatter
         return bool(scatter <= max(allowed, _upper(model.freedom)))
 
     def explains(self, model: Fit, baseline: Fit) -> bool:
@@ -122,37 +121,37 @@ class Judge:
         if not out.any():
             return int(self.rows.sum()) > len(model.values)
         if not model.variants:
-            return model.foreseen(out) <= self._limit(out, STATED)
-        if model.foreseen(out) > self._limit(out):
+            return model.predictive_rms(out) <= self._limit(out, CRITERIA.scatter)
+        if model.predictive_rms(out) > self._limit(out):
             return False
-        # An effect that leans on the doubt of its parameters takes most of the error away.
-        doubt = np.sqrt(1.0 + model.doubt(out) ** 2)
-        return model.rms(out) <= max(self._limit(out) * doubt, MUCH * baseline.rms(out))
+        # An effect whose prediction is uncertain takes most of the error away.
+        expected = self._limit(out) * np.sqrt(1.0 + model.prediction_std(out) ** 2)
+        return model.rms(out) <= max(expected, CRITERIA.share_left * baseline.rms(out))
 
-    def foresees(self, model: Fit) -> bool:
+    def predicts(self, model: Fit) -> bool:
         """Whether a model predicts what was held out, as if its parameters were exact."""
-        return self.excess(model) == 0.0
+        return self.excess_error(model) == 0.0
 
-    def excess(self, model: Fit) -> float:
+    def excess_error(self, model: Fit) -> float:
         """Held-out error beyond that of a right model with exact parameters."""
         out = self.held_rows
         return max(model.rms(out) - self._limit(out), 0.0) if out.any() else 0.0
 
     @property
-    def near(self) -> float:
-        """What a reading is good to, with the doubt of an estimate from n readings.
+    def accuracy(self) -> float:
+        """What a reading is good to, with the standard error of an estimate from n readings.
 
         A curve read from a figure scatters less than it is right.
         """
         if self.given:
             return self.noise
         estimated = self.noise * (1.0 + 2.0 / np.sqrt(max(int(self.rows.sum()), 1)))
-        return max(estimated, READ * float(np.ptp(self._readings.observed[self.rows])))
+        return max(estimated, CRITERIA.accuracy * float(np.ptp(self._readings.observed[self.rows])))
 
     def holdout(self, model: Fit) -> float:
         """Held-out error: of the holdout runs, or of each part predicted from the others."""
         out = self.held_rows
-        return model.rms(out) if out.any() else self.cross_validated(model)
+        return model.rms(out) if out.any() else self.cross_validated(model).error
 
     @property
     def source(self) -> str:
@@ -160,28 +159,31 @@ class Judge:
         if self.held_rows.any():
             return "holdout runs"
         by_run = len(np.unique(self._readings.run[self.rows])) > 1
-        return "leave one run out" if by_run else "leave one of five blocks out"
+        return "leave one run out" if by_run else f"leave one of {CRITERIA.blocks} blocks out"
 
-    def cross_validated(self, model: Fit) -> float:
-        """Error of each part of the fitted readings, predicted from the others."""
-        key = id(model)
-        if key in self._validated:
-            return self._validated[key]
-        total, count = 0.0, 0
-        for part in self._parts():
+    def cross_validated(self, model: Fit) -> CrossValidation:
+        """How well each part of the fitted readings is predicted from the others."""
+        if model not in self._validated:
+            self._validated[model] = self._cross_validate(model)
+        return self._validated[model]
+
+    def _cross_validate(self, model: Fit) -> CrossValidation:
+        parts = self._parts()
+        total, count, failed = 0.0, 0, 0
+        for part in parts:
             rest = self.rows & ~part
-            if rest.sum() <= len(model.values) or not part.any():
-                continue
             variants = _within(model.variants, self._readings.run[rest])
             try:
+                if rest.sum() <= len(model.values) or not part.any():
+                    raise SolveError("too few readings")
                 again = fit(self._experiment, variants, model.values, rest, evaluations=25)
             except SolveError:
+                failed += 1
                 continue
             total += float(np.sum((again.residual * again.weight)[part] ** 2))
             count += int(part.sum())
-        self._validated[key] = float(np.sqrt(total / count)) if count else float("nan")
-        self._kept.append(model)
-        return self._validated[key]
+        error = float(np.sqrt(total / count)) if count else float("nan")
+        return CrossValidation(error, len(parts), failed)
 
     def _parts(self) -> list[Flags]:
         """Parts of the fitted readings to be left out in turn."""
@@ -189,11 +191,11 @@ class Judge:
         runs = np.unique(run[self.rows])
         if len(runs) > 1:
             return [self.rows & (run == number) for number in runs]
-        blocks = np.array_split(np.flatnonzero(self.rows), BLOCKS)
+        blocks = np.array_split(np.flatnonzero(self.rows), CRITERIA.blocks)
         return [np.isin(np.arange(len(run)), block) for block in blocks]
 
-    def _limit(self, out: Flags, least: float = NEAR) -> float:
-        return self.near * max(least, _upper(int(out.sum())))
+    def _limit(self, out: Flags, least: float = CRITERIA.near) -> float:
+        return self.accuracy * max(least, _upper(int(out.sum())))
 
 
 def has_own(variants: Sequence[Variant]) -> bool:

@@ -1,4 +1,4 @@
-"""Is a residual noise? How large noise is, which readings are spikes, and what is left in it."""
+"""Is a residual noise? How large noise is, which readings are outliers, what is left in it."""
 
 from __future__ import annotations
 
@@ -9,21 +9,13 @@ import numpy.typing as npt
 from scipy.signal import lombscargle
 from scipy.stats import chi2
 
+from .criteria import CRITERIA
 from .experiment import Readings
 
-__all__ = ["LIMIT", "Whiteness", "estimated_noise", "lone", "spikes", "whiteness"]
+__all__ = ["Whiteness", "estimated_noise", "missed_readings", "outliers", "whiteness"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
-
-#: Sigmas by which a spike stands out from both neighbours.
-SPIKE = 6.0
-#: ... and times the steps of the readings on both sides of them.
-PEAK = 3.0
-#: Sigmas, from the median, by which a model misses a lone reading; and the share of such readings.
-LONE, MOST_LONE = 6.0, 0.03
-#: Below this a test says that something is left in the residual.
-LIMIT = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +37,7 @@ class Whiteness:
     @property
     def structured(self) -> bool:
         """Something is left in the residual, whatever its size."""
-        return min(self.blocks, self.lags, self.period) < LIMIT
+        return min(self.blocks, self.lags, self.period) < CRITERIA.structure_p
 
 
 def estimated_noise(residual: Array, readings: Readings, rows: Flags) -> float:
@@ -69,7 +61,7 @@ def estimated_noise(residual: Array, readings: Readings, rows: Flags) -> float:
     return float(1.4826 * np.median(np.abs(np.concatenate(found))))
 
 
-def spikes(residual: Array, readings: Readings, rows: Flags) -> Flags:
+def outliers(residual: Array, readings: Readings, rows: Flags) -> Flags:
     """Readings that stand out from both their neighbours, which agree with each other, (n,)."""
     found = np.zeros(len(residual), dtype=bool)
     r_all = residual * readings.weight
@@ -85,15 +77,15 @@ def spikes(residual: Array, readings: Readings, rows: Flags) -> Flags:
             agree = np.abs(r[2:] - r[:-2]) < alone
             # A peak where the motion turns stands out as well, but rises over several readings.
             steps = np.abs(np.diff(r, prepend=r[0], append=r[-1]))
-            agree &= alone > PEAK * np.maximum(steps[:-3], steps[3:])
+            agree &= alone > CRITERIA.outlier_steps * np.maximum(steps[:-3], steps[3:])
             k = int(np.argmax(alone * agree))
-            if alone[k] * agree[k] <= SPIKE * np.sqrt(1.5) * sigma:
+            if alone[k] * agree[k] <= CRITERIA.outlier * np.sqrt(1.5) * sigma:
                 break
             found[own[k + 1]] = True
     return found
 
 
-def lone(residual: Array, readings: Readings, rows: Flags) -> Flags:
+def missed_readings(residual: Array, readings: Readings, rows: Flags) -> Flags:
     """Readings that a model misses by far while it meets all but a few of their run, (n,).
 
     By themselves or two side by side; none of a run where there are more together, or more than a
@@ -104,9 +96,9 @@ def lone(residual: Array, readings: Readings, rows: Flags) -> Flags:
     found = np.zeros(len(z), dtype=bool)
     for run in range(len(readings.names)):
         own = np.flatnonzero(rows & (readings.run == run))
-        far = z[own] > LONE * scale
+        far = z[own] > CRITERIA.missed * scale
         together = far[2:] & far[1:-1] & far[:-2]
-        if far.sum() <= max(2, MOST_LONE * len(own)) and not together.any():
+        if far.sum() <= max(2, CRITERIA.most_missed * len(own)) and not together.any():
             found[own[far]] = True
     return found
 

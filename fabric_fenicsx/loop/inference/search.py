@@ -3,7 +3,7 @@
     score      the residual's projection on the candidate's signature, the model's sensitivity to
                its amplitude at zero, after what the baseline can absorb: one extra solution
     fit        the whole model again, with the candidate in it
-    criterion  χ² + k ln n of the fitted readings (Schwarz); held-out readings choose only between
+    BIC        χ² + k ln n of the fitted readings (Schwarz); held-out readings choose only between
                models that these cannot tell apart
 
 What is accepted must leave noise in the fitted readings and bring the held-out error near it.
@@ -15,42 +15,24 @@ from collections.abc import Callable, Sequence
 from itertools import combinations
 
 from ...errors import SolveError
+from .criteria import CRITERIA
 from .diagnosis import Candidate, Diagnosis, Verdict
 from .effects import Effect
 from .experiment import Experiment
 from .fitting import Fit, fit, parameters_of, without
-from .judge import FAR, Judge, has_own
-from .noise import LIMIT
+from .judge import Judge, has_own
 from .scores import score_tests
-from .starts import WORTHWHILE, fit_from_grid
+from .starts import fit_from_grid
 
 __all__ = ["diagnose_test"]
 
 Model = tuple[Fit, tuple[Effect, ...]]
 
-#: Probability of a score by chance, over all candidates together, below which it is followed
-#: where the baseline's residual is otherwise noise.
-ALARM = 0.01
-#: ... and below which it is enough that parts of the readings are predicted better at all; above
-#: it their error must fall below this share.
-CLEAR, CLEARLY = 1e-3, 0.8
-#: χ² + k ln n by which a second effect must win, and by which a rival may lose.
-DECISIVE = 10.0
-#: χ² + k ln n by which any effect must win against the baseline.
-LEAST = 4.0
-#: Times that readings are left out, from ever better models.
-ROUNDS = 3
-#: Forms of an effect, the best ones, that are fitted again when readings have been left out.
-KEPT = 3
 #: Said where a run has parameters of its own.
 OWN_ZERO = (
     "A load cell's zero, and its drift, of each run: in a run that is not fitted they are taken "
     "from its own readings, so that its error tests the shape of the force, not where it begins."
 )
-#: Effects at most: any three of them would fit almost anything.
-MOST = 2
-#: Effects whose pairs with every other are tried where no single one explains the data.
-FIRST = 3
 
 
 def diagnose_test(
@@ -83,7 +65,7 @@ class _Search:
         self.experiment, self.progress = experiment, progress
         self.judge = Judge(experiment)
         self.effects = [e for e in experiment.effects if names is None or e.name in names]
-        self._forms: dict[int, list[Fit]] = {}
+        self._forms: dict[Effect, list[Fit]] = {}
         self._paired: list[Model] = []
         start = {p.name: p.starts[0] for p in experiment.baseline}
         self.baseline = fit(experiment, (), start, self.judge.rows)
@@ -114,23 +96,27 @@ class _Search:
         return self.judge.explains(model, self.baseline)
 
     def _settled(self, model: Fit) -> bool:
-        """Whether a model leaves noise alone, and foresees what was held out."""
+        """Whether a model leaves noise alone, and predicts what was held out."""
         white = self.judge.whiteness(model)
-        return not white.structured and white.size > LIMIT and self.judge.foresees(model)
+        return (
+            not white.structured
+            and white.size > CRITERIA.structure_p
+            and self.judge.predicts(model)
+        )
 
-    def _foretells(self, model: Model, candidates: list[Candidate]) -> bool:
+    def _predicts_better(self, model: Model, candidates: list[Candidate]) -> bool:
         """Whether a model predicts parts of the fitted readings better than the baseline does."""
         fitted, effects = model
         chance = min((c.p_value for c in candidates if c.effect in effects), default=1.0)
-        share = 1.0 if chance < CLEAR else CLEARLY
-        error = self.judge.cross_validated
-        return error(fitted) < share * error(self.baseline)
+        share = 1.0 if chance < CRITERIA.clear_p else CRITERIA.clearly_better
+        before, after = (self.judge.cross_validated(m).error for m in (self.baseline, fitted))
+        return after < share * before
 
     def run(self) -> Diagnosis:
         """See diagnose_test."""
         candidates, singles = self._tried()
-        for _ in range(ROUNDS):
-            # A spike is seen better once the large part of the residual is gone.
+        for _ in range(CRITERIA.rounds):
+            # An outlier is seen better once the large part of the residual is gone.
             if not (singles and self._leave_out(singles[0].fit or self.baseline)):
                 break
             candidates, singles = self._tried(again=True)
@@ -139,28 +125,35 @@ class _Search:
         nearest: Model = (self.baseline, ())
         explained = self._explains(self.baseline)
         # What the fitted readings do not show cannot be learned from them.
-        silent = self.judge.fits(self.baseline) and all(c.p_value >= ALARM for c in candidates)
-        quiet = explained and silent
-        if not silent:
+        alarm = not self.judge.fits(self.baseline)
+        alarm |= any(c.p_value < CRITERIA.alarm_p for c in candidates)
+        nothing_lacks = explained and not alarm
+        if alarm:
             nearest, explained = self._choose(singles)
-            for _ in range(ROUNDS):
+            for _ in range(CRITERIA.rounds):
                 if not self._leave_out(nearest[0]):
                     break
                 candidates, singles = self._tried(again=True)
                 nearest, explained = self._choose(singles, again=True)
-            if self._explains(self.baseline) and not self._foretells(nearest, candidates):
-                nearest, quiet = (self.baseline, ()), True
+            if self._explains(self.baseline) and not self._predicts_better(nearest, candidates):
+                nearest, nothing_lacks = (self.baseline, ()), True
         for candidate in candidates:
             if candidate.fit is not None:
                 candidate.fit = self._least_squares(candidate.fit)
                 candidate.holdout = self.judge.holdout(candidate.fit)
         baseline = self.baseline
         verdict: Verdict = "effect_found" if explained else "unexplained"
-        if quiet:
+        if nothing_lacks:
             verdict = "no_effect"
         chosen, effects = nearest if verdict == "effect_found" else (baseline, ())
         if effects:
-            chosen = fit(self.experiment, chosen.variants, chosen.values, self.judge.rows)
+            chosen = fit(
+                self.experiment,
+                chosen.variants,
+                chosen.values,
+                self.judge.rows,
+                evaluations=CRITERIA.final_evaluations,
+            )
         self.progress(0.95, "rivals")
         return Diagnosis(
             experiment=self.experiment,
@@ -182,8 +175,26 @@ class _Search:
             white_before=self.judge.whiteness(baseline),
             white_after=self.judge.whiteness(chosen),
             outliers=self.judge.outliers,
-            notes=[*self.experiment.notes, *([OWN_ZERO] if has_own(chosen.variants) else [])],
+            notes=[*self.experiment.notes, *self._notes(chosen)],
         )
+
+    def _notes(self, chosen: Fit) -> list[str]:
+        """What a reader has to know of how the reported model was come by."""
+        notes = [OWN_ZERO] if has_own(chosen.variants) else []
+        models = [(self.baseline, "baseline")]
+        models += [(chosen, "reported model")] if chosen is not self.baseline else []
+        for model, name in models:
+            if not model.converged:
+                notes.append(f"The fit of the {name} has not converged: its numbers are not final.")
+            if self.judge.held_rows.any():
+                continue
+            folds = self.judge.cross_validated(model)
+            if folds.failed:
+                notes.append(
+                    f"Cross-validation of the {name}: {folds.failed} of {folds.parts} parts could "
+                    "not be predicted from the others and are not in its error."
+                )
+        return notes
 
     def _tried(self, again: bool = False) -> tuple[list[Candidate], list[Candidate]]:
         """Every effect by itself; then those that have a solution, the best first.
@@ -204,12 +215,13 @@ class _Search:
         for k, candidate in enumerate(candidates):
             self.progress(0.1 + 0.5 * k / len(candidates), f"fit {candidate.effect.name}")
             if again:
-                self._forms[k] = self._fitted_again(self._forms[k])
+                forms = self._fitted_again(self._forms[candidate.effect])
             else:
-                self._forms[k] = self._forms_of(self.baseline, candidate.effect)
-            candidate.fit = min(self._forms[k], key=self.judge.criterion, default=None)
+                forms = self._forms_of(self.baseline, candidate.effect)
+            self._forms[candidate.effect] = forms
+            candidate.fit = min(forms, key=self.judge.bic, default=None)
         singles = [c for c in candidates if c.fit is not None]
-        singles.sort(key=lambda c: self.judge.criterion(c.fit))
+        singles.sort(key=lambda c: self.judge.bic(c.fit))
         return candidates, singles
 
     # Fits ---------------------------------------------------------------------------------
@@ -217,7 +229,7 @@ class _Search:
     def _forms_of(self, base: Fit, effect: Effect, known: float = float("inf")) -> list[Fit]:
         # Where another model leaves noise already, one start of each form will do.
         starts = 2 if known == float("inf") else 1
-        robust = FAR * self.judge.noise
+        robust = CRITERIA.far * self.judge.noise
         return fit_from_grid(
             self.experiment, base, effect.variants, starts=starts, robust=robust, known=known
         )
@@ -225,7 +237,7 @@ class _Search:
     def _fitted_again(self, forms: list[Fit]) -> list[Fit]:
         """The best of some models, fitted to the readings that are fitted now."""
         fits = []
-        for model in sorted(forms, key=self.judge.criterion)[:KEPT]:
+        for model in sorted(forms, key=self.judge.bic)[: CRITERIA.forms_kept]:
             try:
                 fits.append(
                     fit(
@@ -233,7 +245,7 @@ class _Search:
                         model.variants,
                         model.values,
                         self.judge.rows,
-                        robust=FAR * self.judge.noise,
+                        robust=CRITERIA.far * self.judge.noise,
                     )
                 )
             except SolveError:
@@ -254,7 +266,7 @@ class _Search:
         if not ones:
             return (self.baseline, ()), False
         forms: list[Model] = [
-            (f, (self.effects[k],)) for k, found in self._forms.items() for f in found
+            (f, (effect,)) for effect, found in self._forms.items() for f in found
         ]
         single, explained = self._first_that_explains(ones, forms)
         # Only where something is left, or a prediction leans on how uncertain it is, is a second
@@ -268,17 +280,18 @@ class _Search:
         pairs = self._best_of(forms)
         if not pairs:
             return single, explained
-        # So many forms of pairs, leaning on their doubt, would explain almost anything.
-        forms = [model for model in forms if self.judge.foresees(model[0])]
+        # So many forms of pairs, with predictions as uncertain, would explain almost anything.
+        forms = [model for model in forms if self.judge.predicts(model[0])]
         pair, both_explain = self._first_that_explains(pairs, forms)
-        gain = self.judge.criterion(single[0]) - self.judge.criterion(pair[0])
+        gain = self.judge.bic(single[0]) - self.judge.bic(pair[0])
         if not explained:
-            return (pair, both_explain) if gain > DECISIVE else (single, False)
-        better = self.judge.cross_validated(pair[0]) < 0.97 * self.judge.cross_validated(single[0])
+            return (pair, both_explain) if gain > CRITERIA.decisive else (single, False)
+        one, both = (self.judge.cross_validated(model[0]).error for model in (single, pair))
+        better = both < CRITERIA.better_prediction * one
         # As good a fit will do where it alone predicts what was held out.
-        alone = self.judge.foresees(pair[0]) and not self.judge.foresees(single[0])
+        alone = self.judge.predicts(pair[0]) and not self.judge.predicts(single[0])
         alone &= not has_own(pair[0].variants)
-        enough = gain > (-LEAST if alone else DECISIVE)
+        enough = gain > (-CRITERIA.least_gain if alone else CRITERIA.decisive)
         return (pair, True) if enough and better and both_explain else (single, True)
 
     def _first_that_explains(
@@ -291,27 +304,28 @@ class _Search:
             forms: all that were fitted; asked where the best ones do not predict what was held
                 out, and these fit as well.
         """
-        best = min(self.judge.criterion(model) for model, _ in models)
-        near = [m for m in models if self.judge.criterion(m[0]) < best + DECISIVE]
+        best = min(self.judge.bic(model) for model, _ in models)
+        near = [m for m in models if self.judge.bic(m[0]) < best + CRITERIA.decisive]
         if len(near) > 1:
-            near.sort(key=lambda m: self.judge.cross_validated(m[0]))
-        if best > self.judge.criterion(self.baseline) - LEAST:
-            # What does not lower the criterion is not there, whatever a score says.
+            near.sort(key=lambda m: self.judge.cross_validated(m[0]).error)
+        if best > self.judge.bic(self.baseline) - CRITERIA.least_gain:
+            # What does not lower the BIC is not there, whatever a score says.
             return near[0], False
         explaining = [model for model in near if self._explains(model[0])]
-        if not any(self.judge.foresees(model[0]) for model in explaining):
-            other = [m for m in forms if self.judge.criterion(m[0]) < best + DECISIVE]
-            other.sort(key=lambda m: self.judge.criterion(m[0]))
+        if not any(self.judge.predicts(model[0]) for model in explaining):
+            other = [m for m in forms if self.judge.bic(m[0]) < best + CRITERIA.decisive]
+            other.sort(key=lambda m: self.judge.bic(m[0]))
             explaining += [model for model in other if self._explains(model[0])]
         # Of those that fit alike, one whose prediction needs no excuse, or the least; one that
         # takes its zero from what was held out predicts less.
-        explaining.sort(key=lambda m: (has_own(m[0].variants), self.judge.excess(m[0])))
+        explaining.sort(key=lambda m: (has_own(m[0].variants), self.judge.excess_error(m[0])))
         return (explaining[0], True) if explaining else (near[0], False)
 
     def _pairs(self, singles: list[Candidate]) -> list[Model]:
         """The first few effects with each of the others, the stronger first, in all their forms."""
         found: list[Model] = []
-        pairs = [(a, b) for a, b in combinations(singles, MOST) if singles.index(a) < FIRST]
+        pairs = [(a, b) for a, b in combinations(singles, 2)]
+        pairs = [pair for pair in pairs if singles.index(pair[0]) < CRITERIA.first_effects]
         # Effects of few forms first: where one pair leaves noise, others need less.
         pairs.sort(key=lambda pair: len(pair[1].effect.variants))
         for k, (a, b) in enumerate(pairs):
@@ -321,8 +335,8 @@ class _Search:
                 found += [(f, (a.effect, b.effect)) for f in forms]
         # The form of the first was chosen without the second: now with it.
         known = self._fitted_so_far(found)
-        for both, effects in self._best_of(found)[:FIRST]:
-            if self._size(both) > WORTHWHILE * known:
+        for both, effects in self._best_of(found)[: CRITERIA.first_effects]:
+            if self._size(both) > CRITERIA.worthwhile * known:
                 continue
             try:
                 rest = without(self.experiment, both, effects[0].variants)
@@ -337,7 +351,7 @@ class _Search:
         return min(sizes, default=float("inf"))
 
     def _size(self, model: Fit) -> float:
-        return model.size(FAR * self.judge.noise)
+        return model.size(CRITERIA.far * self.judge.noise)
 
     def _paired_again(self) -> list[Model]:
         """The pairs tried before, in their best forms, fitted to the readings as they are now."""
@@ -349,7 +363,7 @@ class _Search:
     def _best_of(self, models: list[Model]) -> list[Model]:
         """Of each pair of effects the forms that fit best, the best first."""
         best: dict[tuple[str, ...], Model] = {}
-        for model in sorted(models, key=lambda m: self.judge.criterion(m[0])):
+        for model in sorted(models, key=lambda m: self.judge.bic(m[0])):
             best.setdefault(tuple(e.name for e in model[1]), model)
         return list(best.values())
 
@@ -371,7 +385,7 @@ class _Search:
     ) -> dict[str, list[str]]:
         """For each effect, the others that could take its place in the model."""
         found: dict[str, list[str]] = {}
-        limit = self.judge.criterion(chosen, self.judge.near) + DECISIVE
+        limit = self.judge.bic(chosen, self.judge.accuracy) + CRITERIA.decisive
         for own in effects:
             others = [c for c in singles if c.effect not in effects]
             found[own.name] = []
@@ -380,7 +394,7 @@ class _Search:
                     instead = other.fit
                 else:
                     instead = self._instead(chosen, effects, own, other.effect)
-                if instead is not None and self.judge.criterion(instead, self.judge.near) < limit:
+                if instead is not None and self.judge.bic(instead, self.judge.accuracy) < limit:
                     found[own.name].append(other.effect.name)
         return found
 
@@ -395,4 +409,4 @@ class _Search:
             forms += self._forms_of(base, other, self._size(chosen))
         except SolveError:
             pass
-        return min(forms, key=self.judge.criterion, default=None)
+        return min(forms, key=self.judge.bic, default=None)

@@ -10,24 +10,17 @@ import numpy.typing as npt
 from scipy.optimize import lsq_linear
 
 from ...errors import SolveError
+from .criteria import CRITERIA
 from .effects import Parameter, Variant
 from .experiment import Experiment
 from .fitting import Fit, fit, parameters_of, soft_size, weighted
 
-__all__ = ["SMALL", "WORTHWHILE", "Signature", "fit_from_grid", "signatures"]
+__all__ = ["SMALL", "Signature", "fit_from_grid", "signatures"]
 
 Array = npt.NDArray[np.float64]
 
 #: Amplitudes are differentiated here rather than at zero, where |·| and friction have a corner.
 SMALL = 1e-9
-#: Second starts that leave this many times more than the best one, to first order, are left.
-HOPELESS = 4.0
-#: First starts of a form are left from here on.
-FAR_OFF = 30.0
-#: Evaluations after which it shows which fits are worth going on with.
-FIRST_LOOK = 12
-#: ... those that leave no more than this many times what the best one does.
-WORTHWHILE = 30.0
 #: Shares of a step to first order that a fit may begin with.
 DAMPED = (1.0, 0.3, 0.1, 0.0)
 #: Values of a parameter that the readings jump with, as shares of the one found; then nearer ones.
@@ -40,7 +33,7 @@ def fit_from_grid(
     variants: Sequence[Variant],
     *,
     starts: int = 2,
-    evaluations: int = 60,
+    evaluations: int = CRITERIA.evaluations,
     robust: float | None = None,
     known: float = float("inf"),
 ) -> list[Fit]:
@@ -75,24 +68,26 @@ def fit_from_grid(
         promising += [(variant, start) for start in own[:starts]]
     promising.sort(key=lambda one: one[1].left)
     fits: list[Fit] = []
-    followed: set[int] = set()
+    followed: set[Variant] = set()
     for variant, start in promising:
         # To first order is not the last word: one start of each form is fitted, unless it is far
         # off, and whatever is within a factor of the best.
-        limit = HOPELESS if id(variant) in followed else FAR_OFF
+        limit = CRITERIA.second_start if variant in followed else CRITERIA.far_off
         if start.left > limit * promising[0][1].left:
             continue
-        followed.add(id(variant))
+        followed.add(variant)
         model = (*base.variants, variant)
         try:
             at = _damped(experiment, base, variant, start, robust)
-            found = fit(experiment, model, at, base.used, evaluations=FIRST_LOOK, robust=robust)
+            found = fit(
+                experiment, model, at, base.used, evaluations=CRITERIA.first_look, robust=robust
+            )
         except SolveError:
             continue
         fits.append(found)
     sizes = [f.size(robust) for f in fits]
     for k, found in enumerate(fits):
-        if sizes[k] <= WORTHWHILE * min(*sizes, known):
+        if sizes[k] <= CRITERIA.worthwhile * min(*sizes, known):
             found = _again(experiment, found, found.values, evaluations, robust)
             fits[k] = _around_jumps(experiment, found, evaluations, robust)
     return fits

@@ -6,25 +6,22 @@ by, what was left out, what cannot be told apart, what to measure next) is for t
 
 from __future__ import annotations
 
-import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...inputs.keys import UNITS, one_of
+from ..inference.criteria import CRITERIA
 from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Effect, Parameter, Variant
 from ..inference.fitting import Fit, parameters_of
-from ..inference.judge import STATED
-from ..measurement.reading import Measurement
-from .advice import further_test
+from ..kinds import kind_of
+from ..measurement.schema import Measurement
 
-__all__ = ["SCHEMA", "combined_report", "headline", "parameter_unit", "test_report", "write_report"]
+__all__ = ["SCHEMA", "combined_report", "headline", "parameter_unit", "test_report"]
 
 SCHEMA = "fabric-report/1"
 
@@ -73,6 +70,7 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
                 "score": c.score,
                 "p_value": c.p_value,
                 "error_fit": c.fit.rms(rows) if c.fit else None,
+                "converged": c.fit.converged if c.fit else None,
                 "error_holdout": c.holdout,
             }
             for c in d.candidates
@@ -127,19 +125,6 @@ def combined_report(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return reports[-1] | {"tests": {report["test"]: report for report in reports}}
 
 
-def write_report(folder: Path, report: Mapping[str, Any]) -> None:
-    """Write report.json at once, so that nobody sees half of it.
-
-    Raises:
-        OSError: the folder cannot be written.
-    """
-    path = folder / "report.json"
-    partial = folder / "report.json.partial"
-    text = json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False)
-    partial.write_text(text + "\n", encoding="utf-8")
-    os.replace(partial, path)
-
-
 def headline(report: Mapping[str, Any]) -> str:
     """The verdict in one or two plain sentences."""
     error = report["error"]
@@ -169,7 +154,7 @@ def headline(report: Mapping[str, Any]) -> str:
     nor = "and no known effect explains it, nor does a pair of them"
     text = f"The residual is not noise, {nor}: held-out error {before}; {scatter}."
     fitted = error["before"]["fit"]
-    if fitted is not None and fitted <= STATED * error["noise"]:
+    if fitted is not None and fitted <= CRITERIA.scatter * error["noise"]:
         text = (
             "The fitted readings are what the baseline says within their noise, the held-out ones "
             f"are not, {nor}: error {value(fitted)} and {before}; {scatter}."
@@ -182,7 +167,7 @@ def headline(report: Mapping[str, Any]) -> str:
 
 
 def _effect(d: Diagnosis, effect: Effect) -> dict[str, Any]:
-    variant = next(v for v in d.final.variants if _is_form(v, effect))
+    variant = next(v for v in d.final.variants if v in effect.variants)
     rivals = d.rivals.get(effect.name, [])
     return _form(d, d.final, effect, variant) | {"rivals": list(rivals)}
 
@@ -207,17 +192,13 @@ def _std(d: Diagnosis, model: Fit) -> dict[str, float | None]:
     }
 
 
-def _is_form(variant: Variant, effect: Effect) -> bool:
-    return any(variant is form for form in effect.variants)
-
-
 def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
     """All numbers of a fitted model and what it leaves."""
     forms = [
         _form(d, model, effect, variant)
         for variant in model.variants
         for effect in d.experiment.effects
-        if _is_form(variant, effect)
+        if variant in effect.variants
     ]
     return {
         "effects": forms,
@@ -225,6 +206,7 @@ def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
         "std": _std(d, model),
         "error_fit": model.rms(d.baseline.used),
         "error_holdout": holdout,
+        "converged": model.converged,
     }
 
 
@@ -236,16 +218,17 @@ def _parameters(d: Diagnosis) -> list[Parameter]:
 
 
 def _further_tests(d: Diagnosis) -> list[dict[str, Any]]:
-    """What would tell each effect from its rivals."""
-    found = []
-    for effect in d.effects:
-        for rival in d.rivals.get(effect.name, []):
-            found.append({"effects": [effect.name, rival], "do": further_test(effect.name, rival)})
-    return found
+    """What would tell each effect from its rivals, where that is known."""
+    kind = kind_of(d.experiment.test)
+    return [
+        {"effects": [effect.name, rival], "do": kind.further_test(effect.name, rival)}
+        for effect in d.effects
+        for rival in d.rivals.get(effect.name, [])
+    ]
 
 
 def _left_out(d: Diagnosis, measurements: Sequence[Measurement]) -> dict[str, Any]:
-    """Readings that were not compared: spikes one by one, others by their number."""
+    """Readings that were not compared: outliers one by one, others by their number."""
     readings = d.experiment.readings
     outliers, unknown = [], []
     runs = [(m, run) for m in measurements for run in m.runs]

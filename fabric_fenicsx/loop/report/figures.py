@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from ..inference.diagnosis import Diagnosis
 from ..inference.fitting import Fit
+from ..kinds import KINDS, kind_of
 
 __all__ = [
     "candidates_figure",
@@ -32,12 +33,11 @@ WIDTH = 10.0  # of a figure [inch]
 MANY = 4000  # readings above which their markers are drawn as pixels
 
 LAW_AXES = {"curvature_1_mm": "curvature [1/mm]", "moment_N": "moment per width [N]"}
-QUANTITIES = {"force_N": "force [N]", "z_mm": "height z [mm]", "angle_deg": "angle [°]"}
 
 
 def quantity_label(quantity: str) -> str:
     """What is compared, with its unit, as on an axis."""
-    return QUANTITIES.get(quantity, quantity)
+    return next(kind.label for kind in KINDS if kind.quantity == quantity)
 
 
 def shown_model(diagnosis: Diagnosis) -> tuple[Fit, str] | None:
@@ -50,7 +50,7 @@ def shown_model(diagnosis: Diagnosis) -> tuple[Fit, str] | None:
             effect.name
             for variant in best.variants
             for effect in diagnosis.experiment.effects
-            if any(variant is form for form in effect.variants)
+            if variant in effect.variants
         ]
         return best, "with " + " and ".join(names) + " (nearest)"
     return None
@@ -71,7 +71,7 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     model = shown_model(diagnosis)
     # Readings all over a sheet are on no line.
-    scattered = diagnosis.experiment.test == "drape"
+    scattered = kind_of(diagnosis.experiment.test).scattered
     compared = readings.usable & ~diagnosis.outliers
     for number, axes in enumerate(panels.flat):
         if number >= len(names):
@@ -228,8 +228,8 @@ def law_figure(table: pd.DataFrame, label: str | None) -> Figure:
         table[x], table[f"baseline_{y}"], color=BEFORE, linestyle=(0, (4, 2)), label="baseline"
     )
     if label is not None:
-        doubt = 2.0 * table[f"std_{y}"]
-        axes.fill_between(table[x], table[y] - doubt, table[y] + doubt, color=FAINT)
+        band = 2.0 * table[f"std_{y}"]
+        axes.fill_between(table[x], table[y] - band, table[y] + band, color=FAINT)
         axes.plot(table[x], table[y], color=AFTER, label=label)
     axes.set_xlabel(LAW_AXES[x])
     axes.set_ylabel(LAW_AXES[y])

@@ -1,11 +1,11 @@
-"""report.html: what was found, with everything needed to believe or to doubt it, in one file."""
+"""report.html: what was found, with everything needed to judge it, in one file."""
 
 from __future__ import annotations
 
 import base64
 import io
+import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -18,26 +18,42 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ... import __version__
+from ...errors import InputError
+from ...output.files import write_text
 from ..inference.diagnosis import Diagnosis
 from .content import parameter_unit
 from .figures import candidates_figure, data_figure, law_figure, residual_figure, shown_model
 from .law_table import law_table
 
-__all__ = ["write_page"]
+__all__ = ["write_report"]
 
 DOTS = 160  # per inch, of the figures that are files
 
 
-def write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]]]) -> None:
-    """Write report.html, its figures as PNG files beside it and the fitted law as CSV.
+def write_report(
+    folder: Path,
+    parts: Sequence[tuple[Diagnosis, Mapping[str, Any]]],
+    report: Mapping[str, Any],
+) -> None:
+    """Write report.html, its figures as PNG files, fitted laws as CSV, and report.json, last.
 
     Args:
         folder: is there.
         parts: each test's diagnosis and report, in the order of the tests.
+        report: of all tests.
 
     Raises:
-        OSError: the folder cannot be written.
+        InputError: the folder cannot be written.
     """
+    try:
+        _write_page(folder, parts)
+        text = json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False)
+        write_text(folder / "report.json", text + "\n")
+    except OSError as error:
+        raise InputError(f"{folder}: the report cannot be written ({error.strerror})") from error
+
+
+def _write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]]]) -> None:
     sections = []
     for diagnosis, report in parts:
         model = shown_model(diagnosis)
@@ -66,9 +82,7 @@ def write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]]
     environment.filters |= {"number": number, "chance": chance}
     template = files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
     text = environment.from_string(template).render(sections=sections, version=__version__)
-    partial = folder / "report.html.partial"
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, folder / "report.html")
+    write_text(folder / "report.html", text)
 
 
 def number(value: float | None, digits: int = 3) -> Markup:

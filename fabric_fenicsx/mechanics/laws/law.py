@@ -162,12 +162,14 @@ class CrossingLaw:
         name: what reports call it; by default made of the other.
         interlaced: whether it is due to how the tows float over each other, and so scales with
             the interlacing of a weave: not what neighbours do that meet side by side.
+        of_fabric: whether it is the fabric's, rather than the rig's and its clamps'.
         forms: as effects that a picture frame may show.
     """
 
     law: ClassVar[str] = ""
     name: ClassVar[str] = ""
     interlaced: ClassVar[bool] = True
+    of_fabric: ClassVar[bool] = True
     forms: ClassVar[tuple[Form, ...]] = ()
 
     def __init_subclass__(cls) -> None:

@@ -10,7 +10,8 @@ from typing import Any
 
 from ufl import max_value, min_value, tanh
 
-from ...inference.effects import Effect, Parameter, StripVariant
+from ...inference.effects import Effect, Parameter
+from .variant import StripVariant
 
 __all__ = ["CANTILEVER_EFFECTS"]
 
@@ -59,6 +60,7 @@ CANTILEVER_EFFECTS = (
                 unloaded=lambda p: p["kappa0_1_mm"],
             ),
         ),
+        of_fabric=False,
     ),
     Effect(
         "nonlinear_bending",
@@ -90,6 +92,7 @@ CANTILEVER_EFFECTS = (
                 slope=lambda p, root: p["compliance_rad_per_N"] * root,
             ),
         ),
+        of_fabric=False,
     ),
     Effect(
         "clamp_tilt",
@@ -102,5 +105,6 @@ CANTILEVER_EFFECTS = (
                 slope=lambda p, root: p["tilt_rad"],
             ),
         ),
+        of_fabric=False,
     ),
 )

@@ -23,11 +23,12 @@ from scipy.interpolate import CubicSpline
 
 from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, Parameter, StripVariant, Variant, scaled
+from ...inference.effects import Effect, Parameter, Variant, scaled
 from ...inference.experiment import Law, Readings
-from ...measurement.reading import Measurement
+from ...measurement.schema import Measurement
 from .effects import CANTILEVER_EFFECTS
 from .hanging import HangingTow, Laws
+from .variant import StripVariant
 
 __all__ = ["Cantilever"]
 
@@ -93,7 +94,7 @@ class Cantilever:
         known = len(given) == len(measurements)
         self.noise = float(np.sqrt(np.mean(np.square(given)))) if known else None
         self._lay_out(measurements)
-        self._compiled: dict[tuple[int, str], Marched] = {}
+        self._compiled: dict[tuple[StripVariant, str], Marched] = {}
         count = len(self._run)
         slope, self.scatter = self._measured_slopes()
         unknown = np.isnan(self._arc)
@@ -315,7 +316,7 @@ class Cantilever:
 
     def _law(self, variant: StripVariant, result: str, of: str) -> Marched:
         """One of a variant's expressions, with its derivatives."""
-        key = (id(variant), result)
+        key = (variant, result)
         if key not in self._compiled:
             law = Marched((of,), ("B", *(p.name for p in variant.parameters)))
             given = (law.at,) if result == "unloaded" else (law.at, law.at[of])

@@ -14,7 +14,8 @@ from typing import Any
 
 from ufl import cos, pi, sin
 
-from ...inference.effects import DrapeVariant, Effect, Parameter, Values
+from ...inference.effects import Effect, Parameter, Values
+from .variant import DrapeVariant
 
 __all__ = ["DRAPE_EFFECTS", "HOLDER_FRICTION"]
 

@@ -28,14 +28,15 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import gaussian_filter
 
 from ....errors import SolveError
-from ....rigs.cases import DrapeCase
+from ....rigs.drape import DrapeCase
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import DrapeVariant, Effect, Parameter, Variant
+from ...inference.effects import Effect, Parameter, Variant
 from ...inference.experiment import Readings
 from ...inference.noise import estimated_noise
-from ...measurement.reading import Measurement
+from ...measurement.schema import Measurement
 from .effects import DRAPE_EFFECTS
 from .shear_field import ShearField, ShearLaw, Solve, drape_case, hermite_weights, solved_field
+from .variant import DrapeVariant
 
 __all__ = ["Drape"]
 
@@ -87,8 +88,10 @@ class Drape:
         self.effects = [*DRAPE_EFFECTS, *own]
         self._solve = solve
         self._fields: dict[str, ShearField] = {}
+        self._filtered: dict[str, ShearField] = {}
         self._unsolved: dict[tuple[str, float], str] = {}
-        self._compiled: dict[int, Marched] = {}
+        self._compiled: dict[DrapeVariant, Marched] = {}
+        self._clipped: list[str] = []
         self.use(shear, C1, source)
 
     def use(self, shear: ShearLaw | None, C1: float | None, source: str) -> None:
@@ -113,12 +116,13 @@ class Drape:
 
         Args:
             fitted: parameters by test; of a picture frame k1_N, k3_N and c1_N_s are taken, of a
-                cantilever C1_MPa. A negative part of the shear law is left out.
+                cantilever C1_MPa. A negative part of the shear law is left out, and noted.
         """
         shear, C1 = None, None
         if "picture_frame" in fitted:
-            parts = (fitted["picture_frame"][name] for name in ("k1_N", "k3_N", "c1_N_s"))
-            shear = ShearLaw(*(max(part, 0.0) for part in parts))
+            law = {name: fitted["picture_frame"][name] for name in ("k1_N", "k3_N", "c1_N_s")}
+            self._clipped = [f"{name} = {value:.4g}" for name, value in law.items() if value < 0.0]
+            shear = ShearLaw(*(max(value, 0.0) for value in law.values()))
         if "cantilever" in fitted:
             C1 = fitted["cantilever"]["C1_MPa"]
         self.use(shear, C1, "fitted to the other tests")
@@ -242,6 +246,10 @@ class Drape:
             f"The model's own scatter, from two meshes, is {scatter:.2g} degrees rms at these "
             "places. Readings are weighted with it and errors are weighted errors: one as large "
             "as the noise means a misfit of noise and model scatter together.",
+            *(
+                f"{part} was fitted to the picture frame: negative, so that 0 is taken here."
+                for part in self._clipped
+            ),
             *(f"{n} = {a:g}: {why}; left out." for (n, a), why in self._unsolved.items()),
         ]
 
@@ -255,9 +263,9 @@ class Drape:
     ) -> tuple[Array, dict[str, Array]]:
         """Angles [degrees] and their derivatives; see Experiment."""
         # Offset before rotation, whichever was found first: marks keep to the tools' axes.
-        place = {id(v): k for k, v in enumerate(v for e in self.effects for v in e.variants)}
+        place = {v: k for k, v in enumerate(v for e in self.effects for v in e.variants)}
         mine = [v for v in variants if isinstance(v, DrapeVariant)]
-        mine.sort(key=lambda v: place.get(id(v), len(place)))
+        mine.sort(key=lambda v: place.get(v, len(place)))
         names = [p.name for v in mine for p in v.parameters]
         expected = np.zeros(len(self.sigma))
         slopes = {name: np.zeros(len(expected)) for name in names}
@@ -289,12 +297,11 @@ class Drape:
         for variant in variants:
             if variant.places is None:
                 continue
-            key = id(variant)
-            if key not in self._compiled:
+            if variant not in self._compiled:
                 marched = Marched(("x", "y"), tuple(p.name for p in variant.parameters))
                 x, y = variant.places(marched.at, marched.at["x"], marched.at["y"])
-                self._compiled[key] = marched.define({"x": x, "y": y}, {})
-            at = self._compiled[key](at, values)
+                self._compiled[variant] = marched.define({"x": x, "y": y}, {})
+            at = self._compiled[variant](at, values)
         return at
 
     def _mixture(
@@ -347,11 +354,10 @@ class Drape:
                 return found
 
     def _field(self, m: Measurement, changes: Mapping[str, Any]) -> ShearField:
-        raw = self._raw(m, changes)
-        key = f"filtered {id(raw)}"
-        if key not in self._fields:
-            self._fields[key] = raw.filtered()
-        return self._fields[key]
+        key = self._case(m, changes).model_dump_json()
+        if key not in self._filtered:
+            self._filtered[key] = self._raw(m, changes).filtered()
+        return self._filtered[key]
 
     def _raw(self, m: Measurement, changes: Mapping[str, Any]) -> ShearField:
         """The field of a changed case, solved once."""

@@ -17,11 +17,10 @@ from pydantic import ValidationError
 from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
 
 from ....errors import InputError, SolveError
-from ....rigs.cases import DrapeCase
 from ....rigs.common import Session, control
-from ....rigs.drape import build
+from ....rigs.drape import DrapeCase, build
 from ....rigs.simulation import simulate
-from ...measurement.reading import FILE, Measurement
+from ...measurement.schema import FILE, Measurement
 
 __all__ = ["ShearField", "ShearLaw", "Solve", "drape_case", "hermite_weights", "solved_field"]
 

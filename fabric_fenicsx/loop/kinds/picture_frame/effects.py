@@ -9,7 +9,8 @@ from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws import LAWS
-from ...inference.effects import Effect, FrameVariant, Values, law_effects
+from ...inference.effects import Effect, Values
+from .variant import FrameVariant, law_effects
 
 __all__ = ["PICTURE_FRAME_EFFECTS"]
 
@@ -78,6 +79,7 @@ PICTURE_FRAME_EFFECTS = (
                 "play on the way back", (TRAVEL,), travel=_play(0.0, 1.0), remembers_travel=True
             ),
         ),
+        of_fabric=False,
     ),
     Effect(
         "load_drift",
@@ -110,5 +112,6 @@ PICTURE_FRAME_EFFECTS = (
                 each_run=True,
             ),
         ),
+        of_fabric=False,
     ),
 )

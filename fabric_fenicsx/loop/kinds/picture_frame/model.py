@@ -27,12 +27,13 @@ from ....mechanics.laws.law import Crossing
 from ....mechanics.laws.springs import PolynomialSpring
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, FrameVariant, Variant, scaled
+from ...inference.effects import Effect, Variant, scaled
 from ...inference.experiment import Readings
 from ...inference.noise import estimated_noise
-from ...measurement.reading import Measurement
+from ...measurement.schema import Measurement
 from .effects import PICTURE_FRAME_EFFECTS
-from .motion import Programme, frame_programme
+from .motion import Motion, frame_motion
+from .variant import FrameVariant
 
 __all__ = ["PictureFrame"]
 
@@ -61,18 +62,18 @@ class PictureFrame:
     def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
         self.noise = _common_noise(measurements)
         runs = [(m, run) for m in measurements for run in m.runs]
-        programmes = [
-            frame_programme(
+        motions = [
+            frame_motion(
                 run.columns["time_s"], run.columns["displacement_mm"], m.rig.frame_length_mm
             )
             for m, run in runs
         ]
-        self._lay_out(programmes)
+        self._lay_out(motions)
         self._rig = {
             "frame": Varying(np.array([[m.rig.frame_length_mm for m, _ in runs]])),
             "fabric": Varying(np.array([[m.rig.fabric_length_mm for m, _ in runs]])),
         }
-        self._compiled: dict[int, Marched] = {}
+        self._compiled: dict[Any, Marched] = {}
         kinematics = self._kinematics(self._travel(None, {}), {})
         gamma, rate = (self._at_readings(kinematics[key].value) for key in ("gamma", "rate"))
         time = self._at_readings(self._points["time"].value)
@@ -80,7 +81,7 @@ class PictureFrame:
             observed=np.concatenate([run.columns["force_N"] for _, run in runs]),
             run=np.repeat(np.arange(len(runs)), [run.count for _, run in runs]),
             holdout=np.repeat([run.holdout for _, run in runs], [run.count for _, run in runs]),
-            usable=np.concatenate([p.certain for p in programmes]),
+            usable=np.concatenate([p.certain for p in motions]),
             weight=np.ones(sum(run.count for _, run in runs)),
             names=tuple(run.label or run.file for _, run in runs),
             covariates={
@@ -89,17 +90,19 @@ class PictureFrame:
                 "time [s]": time,
             },
         )
-        doubt = np.concatenate([p.doubt for p in programmes])
-        self._leave_out_uncertain(doubt * self._at_readings(kinematics["rate_per_speed"].value))
+        rate_error = np.concatenate([p.rate_error for p in motions])
+        self._leave_out_uncertain(
+            rate_error * self._at_readings(kinematics["rate_per_speed"].value)
+        )
         shares = {
-            "duration": max(float(p.time[-1] - p.time[0]) for p in programmes),
+            "duration": max(float(p.time[-1] - p.time[0]) for p in motions),
             "angle": float(np.abs(gamma).max()),
             "rate": float(np.abs(rate).max()),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
         self.effects = [self._with_runs(scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
 
-    def _leave_out_uncertain(self, doubt: Array) -> None:
+    def _leave_out_uncertain(self, rate_error: Array) -> None:
         """Leave out readings whose rate is so uncertain [rad/s] that the dashpot's force is.
 
         By more than a reading scatters, with the dashpot of a first fit, which also says how much
@@ -114,19 +117,19 @@ class PictureFrame:
         residual = self.readings.observed - J @ k
         noise = self.noise or estimated_noise(residual, self.readings, rows)
         factor = self._at_readings(self._kinematics(self._travel(None, {}), {})["factor"].value)
-        # Where nothing is known of the rate the programme has left the reading out itself.
-        doubt = np.where(np.isfinite(doubt), doubt, 0.0)
-        clear = ~(np.abs(k[-1] * factor * doubt) >= noise)
+        # Where nothing is known of the rate the motion has left the reading out itself.
+        rate_error = np.where(np.isfinite(rate_error), rate_error, 0.0)
+        clear = ~(np.abs(k[-1] * factor * rate_error) >= noise)
         if (rows & clear).sum() > rows.sum() / 2:
             self.readings = replace(self.readings, usable=self.readings.usable & clear)
 
-    def _lay_out(self, programmes: Sequence[Programme]) -> None:
+    def _lay_out(self, motions: Sequence[Motion]) -> None:
         """Records side by side; the shorter ones rest at their last point."""
-        longest = max(len(p.time) for p in programmes)
-        shape = (longest, len(programmes))
+        longest = max(len(p.time) for p in motions)
+        shape = (longest, len(motions))
         time, D, rate = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         places = []
-        for r, p in enumerate(programmes):
+        for r, p in enumerate(motions):
             count = len(p.time)
             time[:count, r], D[:count, r], rate[:count, r] = p.time, p.displacement, p.rate
             time[count:, r] = p.time[-1] + np.arange(1, longest - count + 1)
@@ -182,7 +185,7 @@ class PictureFrame:
         """True displacement of the frame, and its rate."""
         if variant is None or variant.travel is None:
             return {"D": self._points["D"], "D_rate": self._points["D_rate"]}
-        key = id(variant)
+        key = (variant, "travel")
         if key not in self._compiled:
             marched = Marched(("D", "D_rate"), tuple(p.name for p in variant.parameters))
             past = marched.remembered("D") if variant.remembers_travel else None
@@ -194,7 +197,7 @@ class PictureFrame:
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         """γ at each point and at the one before, γ̇, and force per moment."""
-        if 0 not in self._compiled:
+        if "kinematics" not in self._compiled:
             marched = Marched(("D", "D_rate", "frame", "fabric"), ())
             at = marched.at
             theta = acos((sqrt(2.0) + at["D"] / at["frame"]) / 2)
@@ -205,10 +208,10 @@ class PictureFrame:
                 "rate_per_speed": derivative_of(gamma, at["D"]),
                 "factor": at["fabric"] ** 2 / (at["frame"] * sin(theta)),
             }
-            self._compiled[0] = marched.define(outputs, {})
+            self._compiled["kinematics"] = marched.define(outputs, {})
         shape = travel["D"].value.shape
         rig = {name: Varying(np.broadcast_to(v.value, shape)) for name, v in self._rig.items()}
-        known = self._compiled[0]({**travel, **rig}, values)
+        known = self._compiled["kinematics"]({**travel, **rig}, values)
         gamma = known["gamma"]
         before = Varying(_shifted(gamma.value), {p: _shifted(s) for p, s in gamma.slopes.items()})
         return {**known, "gamma_n": before, "per_time": self._points["per_time"]}
@@ -217,7 +220,7 @@ class PictureFrame:
         self, variant: FrameVariant | None, known: dict[str, Varying], values: Mapping[str, float]
     ) -> Varying:
         """Moment per area [N] of the baseline or of an effect."""
-        key = 1 if variant is None else id(variant)
+        key = (variant, "moment")
         if key not in self._compiled:
             parameters = self.baseline if variant is None else variant.parameters
             marched = Marched(
@@ -249,7 +252,7 @@ class PictureFrame:
         return self._compiled[key](known, values)["moment"]
 
     def _reading(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
-        key = id(variant)
+        key = (variant, "reading")
         if key not in self._compiled:
             assert variant.reading is not None
             marched = Marched(("time",), tuple(p.name for p in variant.parameters))
@@ -285,7 +288,7 @@ class PictureFrame:
         assert variant.reading is not None
         names = dict.fromkeys(p.name.split("_", 1)[1] for p in variant.parameters)
         # The form's, not the variant's, which may have parameters of fewer runs.
-        key = id(variant.reading)
+        key = variant.reading
         if key not in self._compiled:
             unit = Marched(("time",), tuple(names))
             added = variant.reading(unit.at, unit.at["time"])

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
-__all__ = ["Programme", "frame_programme", "programme"]
+__all__ = ["Motion", "frame_motion", "motion"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -24,7 +24,7 @@ LEAST_JUMP = 0.05
 #: ... and this many times the change over the readings around it.
 JUMP_RATIO = 4.0
 #: Share of the largest speed by which two estimates of a rate may differ.
-DOUBT = 0.02
+RATE_ERROR = 0.02
 #: Points put between two readings where the speed changes much.
 BETWEEN = 7
 #: Share of the readings whose rate is known below which a motion at one speed is looked for ...
@@ -34,7 +34,7 @@ LEGS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Programme:
+class Motion:
     """A prescribed motion, at its readings and at corners between them.
 
     Attributes:
@@ -42,7 +42,8 @@ class Programme:
         displacement: [mm], (n,).
         rate: its rate [mm/s] on the piece that a point belongs to, (n,).
         reading: index of the reading at each point; -1 for a corner between readings.
-        doubt: by how much two estimates of the rate at each reading differ [mm/s], (n_readings,).
+        rate_error: by how much two estimates of the rate at each reading differ [mm/s],
+            (n_readings,).
         certain: whether the rate at each reading is known: not at a corner, nor where the speed
             changed faster than it was sampled, (n_readings,).
     """
@@ -51,15 +52,15 @@ class Programme:
     displacement: Array
     rate: Array
     reading: npt.NDArray[np.int64]
-    doubt: Array
+    rate_error: Array
     certain: Flags
 
 
-def frame_programme(time: Array, displacement: Array, frame_length: float) -> Programme:
-    """The programme of a picture frame, driven at constant speeds or at constant shear rates.
+def frame_motion(time: Array, displacement: Array, frame_length: float) -> Motion:
+    """The motion of a picture frame, driven at constant speeds or at constant shear rates.
 
-    Whichever of the two leaves fewer readings in doubt: legs at a constant rate are straight in
-    the one of crosshead and angle that was driven, and a few readings tell their rate exactly.
+    Whichever of the two leaves fewer readings with an unknown rate: legs at a constant rate are
+    straight in the one of crosshead and angle that was driven, and a few readings tell their rate.
 
     Args:
         time: of the readings [s], increasing, (n,).
@@ -79,30 +80,30 @@ def frame_programme(time: Array, displacement: Array, frame_length: float) -> Pr
         angle,
         displacement=frame_length * (2 * np.cos(theta) - np.sqrt(2.0)),
         rate=lever * angle.rate,
-        doubt=frame_length * np.sin(np.pi / 4 - gamma / 2) * angle.doubt,
+        rate_error=frame_length * np.sin(np.pi / 4 - gamma / 2) * angle.rate_error,
     )
 
 
-def _best_known(time: Array, values: Array, resolution: float) -> Programme:
-    """The programme of a record, that at one speed where it is sparse and that tells more."""
-    general = programme(time, values, resolution)
+def _best_known(time: Array, values: Array, resolution: float) -> Motion:
+    """The motion of a record, that at one speed where it is sparse and that tells more."""
+    general = motion(time, values, resolution)
     if general.certain.mean() >= SPARSE:
         return general
     steady = _to_and_fro(time, values, resolution)
     return general if steady is None or not _clearer(steady, general) else steady
 
 
-def _clearer(one: Programme, other: Programme) -> bool:
-    """Whether the rates of a record are known better from one programme than from another."""
+def _clearer(one: Motion, other: Motion) -> bool:
+    """Whether the rates of a record are known better from one motion than from another."""
 
-    def doubt(p: Programme) -> float:
-        return float(np.median(p.doubt) / max(float(np.abs(p.rate).max()), 1e-300))
+    def error(p: Motion) -> float:
+        return float(np.median(p.rate_error) / max(float(np.abs(p.rate).max()), 1e-300))
 
     counts = int(one.certain.sum()), int(other.certain.sum())
-    return counts[0] > counts[1] or (counts[0] == counts[1] and doubt(one) < doubt(other))
+    return counts[0] > counts[1] or (counts[0] == counts[1] and error(one) < error(other))
 
 
-def programme(time: Array, displacement: Array, resolution: float | None = None) -> Programme:
+def motion(time: Array, displacement: Array, resolution: float | None = None) -> Motion:
     """Find the corners of a record and the rates between them.
 
     Args:
@@ -117,7 +118,7 @@ def programme(time: Array, displacement: Array, resolution: float | None = None)
     rate = np.zeros_like(time)
     top = float(np.abs(np.diff(displacement) / np.diff(time)).max())
     near = 1e-6 * float(np.ptp(time))
-    certain, doubt = np.ones(len(time), dtype=bool), np.zeros_like(rate)
+    certain, rate_error = np.ones(len(time), dtype=bool), np.zeros_like(rate)
     added: list[tuple[float, float, float]] = []
     for low, high in pairwise(edges):
         inside = np.flatnonzero((time >= low - near) & (time <= high + near))
@@ -126,13 +127,13 @@ def programme(time: Array, displacement: Array, resolution: float | None = None)
         # A reading at a corner belongs to the piece before it.
         rates, unsure = _rates(time[inside], displacement[inside], resolution, top)
         own = (time[inside] > low + near) | ~np.isfinite(low)
-        rate[inside[own]], doubt[inside[own]] = rates[own], unsure[own]
-    certain &= doubt < DOUBT * top
-    # By itself among readings in doubt, a reading's two estimates may agree by chance.
+        rate[inside[own]], rate_error[inside[own]] = rates[own], unsure[own]
+    certain &= rate_error < RATE_ERROR * top
+    # By itself among readings of unknown rate, a reading's two estimates may agree by chance.
     beside = np.zeros_like(certain)
     beside[1:] |= certain[:-1]
     beside[:-1] |= certain[1:]
-    certain &= beside | (doubt <= 4.0 * resolution / np.gradient(time) + 1e-9 * top)
+    certain &= beside | (rate_error <= 4.0 * resolution / np.gradient(time) + 1e-9 * top)
     for corner in corners:
         at = np.abs(time - corner) <= near
         if at.any():
@@ -146,7 +147,7 @@ def programme(time: Array, displacement: Array, resolution: float | None = None)
             value = displacement[k - 1] + rate[k - 1] * (corner - time[k - 1])
             added.append((corner, float(value), float(rate[k - 1])))
     # Slow and not at rest: which way it goes is not known.
-    certain &= (rate == 0.0) | (np.abs(rate) > DOUBT * top)
+    certain &= (rate == 0.0) | (np.abs(rate) > RATE_ERROR * top)
     added += _between(time, displacement, rate, corners, top)
     points = [
         (t, d, v, i) for i, (t, d, v) in enumerate(zip(time, displacement, rate, strict=True))
@@ -161,13 +162,18 @@ def programme(time: Array, displacement: Array, resolution: float | None = None)
         certain[0] = False
     points.sort(key=lambda point: point[0])
     columns = np.array(points)
-    return Programme(
-        columns[:, 0], columns[:, 1], columns[:, 2], columns[:, 3].astype(np.int64), doubt, certain
+    return Motion(
+        columns[:, 0],
+        columns[:, 1],
+        columns[:, 2],
+        columns[:, 3].astype(np.int64),
+        rate_error,
+        certain,
     )
 
 
-def _to_and_fro(time: Array, values: Array, resolution: float) -> Programme | None:
-    """The programme of a motion to and fro at one speed; None if the record is not that of one.
+def _to_and_fro(time: Array, values: Array, resolution: float) -> Motion | None:
+    """The motion of a motion to and fro at one speed; None if the record is not that of one.
 
     Intervals without a turn all show that speed, and those with one less. So two readings tell a
     leg where others have told the speed, and what is missing in between tells when it turned.
@@ -200,11 +206,11 @@ def _to_and_fro(time: Array, values: Array, resolution: float) -> Programme | No
         ]
     )
     points = points[np.argsort(points[:, 0])]
-    doubt = np.where(known, 0.0, np.inf)
+    rate_error = np.where(known, 0.0, np.inf)
     if abs(values[0]) <= max(resolution, 1e-6 * float(np.ptp(values))):
         known[0] = False
-    return Programme(
-        points[:, 0], points[:, 1], points[:, 2], points[:, 3].astype(np.int64), doubt, known
+    return Motion(
+        points[:, 0], points[:, 1], points[:, 2], points[:, 3].astype(np.int64), rate_error, known
     )
 
 
@@ -263,20 +269,20 @@ def _rates(time: Array, displacement: Array, resolution: float, top: float) -> t
         return np.zeros(count), np.zeros(count)
     step = np.ptp(time) / (count - 1)
     # Wide enough for the rounding of the record to average out.
-    half = int(np.clip(np.ceil(resolution / (0.1 * DOUBT * top * step)), 1, 6))
+    half = int(np.clip(np.ceil(resolution / (0.1 * RATE_ERROR * top * step)), 1, 6))
     near, far = np.empty(count), np.empty(count)
     for i in range(count):
         # Of three points the same parabola twice would tell nothing.
         near[i] = _slope_at(time, displacement, i, half, 2 if count > 3 else 1)
         far[i] = _slope_at(time, displacement, i, 2 * half, 4)
-    doubt = np.abs(far - near)
+    rate_error = np.abs(far - near)
     for i in range(1, count - 1):
         # At rest, as far as the record can tell.
         if np.ptp(displacement[i - 1 : i + 2]) <= 2.0 * resolution * (1.0 + 1e-6):
-            far[i], doubt[i] = 0.0, 0.0
+            far[i], rate_error[i] = 0.0, 0.0
     if count == 3 and not _in_line(time, displacement, 2, -1, resolution):
-        doubt[:] = np.inf
-    return far, doubt
+        rate_error[:] = np.inf
+    return far, rate_error
 
 
 def _slope_at(time: Array, values: Array, i: int, half: int, degree: int) -> float:
@@ -296,7 +302,7 @@ def _corners(time: Array, displacement: Array, resolution: float) -> list[float]
     if count < 6:
         return []
     speed = np.diff(displacement) / np.diff(time)
-    doubt = 4.0 * resolution / np.diff(time)
+    rate_error = 4.0 * resolution / np.diff(time)
     top = float(np.abs(speed).max())
     found: list[float] = []
     for j in range(1, len(speed) - 1):
@@ -307,7 +313,7 @@ def _corners(time: Array, displacement: Array, resolution: float) -> list[float]
         after = before if after is None else after
         if before is None or after is None:
             continue
-        if jump < max(LEAST_JUMP * top, doubt[j - 1] + doubt[j + 1]):
+        if jump < max(LEAST_JUMP * top, rate_error[j - 1] + rate_error[j + 1]):
             continue
         if jump < JUMP_RATIO * max(before, after):
             continue

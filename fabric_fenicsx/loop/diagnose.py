@@ -1,0 +1,185 @@
+"""From folders of measured data to a report of what the model lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from mpi4py import MPI
+
+from ..errors import FitError, InputError, SolveError
+from ..inputs.keys import one_of
+from ..output.folder import prepare_folder
+from .inference.diagnosis import Diagnosis
+from .inference.effects import Effect
+from .inference.experiment import Experiment
+from .inference.search import diagnose_test
+from .inference.starts import SMALL
+from .kinds import KINDS
+from .measurement.kind import Kind
+from .measurement.reading import read_folder
+from .measurement.schema import Measurement
+from .own_effects import read_effects
+from .report.content import combined_report, test_report
+from .report.page import write_report
+
+__all__ = ["Found", "diagnose", "read_measurement", "read_measurements"]
+
+Test = tuple[Kind, list[Measurement], Any]
+"""A kind, its measurements and the experiment made of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a diagnosis found.
+
+    Attributes:
+        report: the content of report.json.
+        diagnoses: of each test, in the order of the kinds.
+    """
+
+    report: dict[str, Any]
+    diagnoses: tuple[Diagnosis, ...]
+
+
+def read_measurement(folder: Path | str) -> Measurement:
+    """Read and check a folder of measured data.
+
+    Raises:
+        InputError: one line with the file, the key or column, and what is allowed.
+    """
+    return read_folder(Path(folder), KINDS)
+
+
+def read_measurements(folders: Sequence[Path]) -> list[Measurement]:
+    """Read folders of measured data, tests of one fabric.
+
+    Raises:
+        InputError: as read_measurement, or a folder stands twice.
+    """
+    places = [folder.resolve() for folder in folders]
+    for i, folder in enumerate(folders):
+        if places[i] in places[:i]:
+            raise InputError(f"{folder}: stands twice, allowed is once")
+    return [read_measurement(folder) for folder in folders]
+
+
+def diagnose(
+    measurements: Sequence[Measurement],
+    out: Path | str | None = None,
+    *,
+    effects: Sequence[str] | None = None,
+    effects_from: Path | None = None,
+    models: Mapping[str, Callable[..., Experiment]] = MappingProxyType({}),
+    progress: Callable[[float, str], None] = lambda done, what: None,
+) -> Found:
+    """Fit the model to measurements of one fabric, trace what is left, and report.
+
+    Args:
+        measurements: of any kinds.
+        out: folder for report.json, report.html and its figures; None writes nothing.
+        effects: names of those to try; by default all that are known.
+        effects_from: a Python file with effects of the user's own.
+        models: by test, to be taken instead of that kind's own; see Kind.experiment.
+        progress: told the share that is done and what is being done.
+
+    Raises:
+        InputError: an effect cannot be used, or the report cannot be written.
+        FitError: a baseline could not be fitted.
+    """
+    own = read_effects(effects_from) if effects_from is not None else []
+    tests = _experiments(measurements, own, models)
+    _check_names(effects, tests)
+    for kind, _, experiment in tests:
+        if not kind.needs_others:
+            _try_out(experiment, own)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        prepare_folder(folder, MPI.COMM_SELF)
+    parts: list[tuple[Diagnosis, dict[str, Any]]] = []
+    for number, (kind, same, experiment) in enumerate(tests):
+
+        def part(share: float, what: str, number: int = number) -> None:
+            progress((number + share) / len(tests), what)
+
+        if kind.needs_others:
+            experiment.take(_fitted(diagnosis for diagnosis, _ in parts))
+            _try_out(experiment, own)
+        try:
+            diagnosis = diagnose_test(experiment, effects, part)
+        except SolveError as error:
+            raise _unfitted(kind, error) from error
+        parts.append((diagnosis, test_report(diagnosis, same)))
+    report = combined_report([content for _, content in parts])
+    if folder is not None:
+        progress(1.0, "drawing")
+        write_report(folder, parts, report)
+    return Found(report, tuple(diagnosis for diagnosis, _ in parts))
+
+
+def _experiments(
+    measurements: Sequence[Measurement],
+    own: Sequence[Effect],
+    models: Mapping[str, Callable[..., Experiment]],
+) -> list[Test]:
+    """The tests in the order of the kinds, each with its experiment."""
+    tests: list[Test] = []
+    for kind in KINDS:
+        same = [m for m in measurements if m.test == kind.name]
+        if same:
+            mine = [effect for effect in own if effect.test == kind.name]
+            try:
+                model = models.get(kind.name, kind.experiment)
+                tests.append((kind, same, model(same, mine)))
+            except SolveError as error:
+                raise _unfitted(kind, error) from error
+    for _, _, experiment in tests:
+        known = [effect.name for effect in experiment.effects]
+        for name in known:
+            if known.count(name) > 1:
+                raise InputError(f"--effects-from: {name}: stands twice, allowed is a new name")
+    return tests
+
+
+def _fitted(earlier: Any) -> Mapping[str, Mapping[str, float]]:
+    """What earlier tests say of the fabric, by test.
+
+    An effect of the rig is taken out: the law beside it is the fabric's. An effect of the fabric
+    the next test has not got, so that the baseline's own fit, which imitates it, is nearer.
+    """
+    return {
+        d.experiment.test: (
+            d.baseline if any(effect.of_fabric for effect in d.effects) else d.final
+        ).values
+        for d in earlier
+    }
+
+
+def _check_names(names: Sequence[str] | None, tests: Sequence[Test]) -> None:
+    allowed = [effect.name for _, _, experiment in tests for effect in experiment.effects]
+    for name in names or ():
+        if name not in allowed:
+            raise InputError(f"--effects: {name!r}, allowed is {one_of(allowed)}")
+
+
+def _try_out(experiment: Experiment, own: Sequence[Effect]) -> None:
+    """Evaluate every form of the user's own effects once: what fails there is their file's."""
+    start = {p.name: p.starts[0] for p in experiment.baseline}
+    names = [effect.name for effect in own]
+    for effect in (effect for effect in experiment.effects if effect.name in names):
+        for variant in effect.variants:
+            first = variant.grid(amplitudes=False)[0]
+            first |= {p.name: SMALL for p in variant.amplitudes}
+            try:
+                experiment.predict((variant,), start | first)
+            except Exception as error:
+                reason = " ".join(f"{type(error).__name__}: {error}".split())
+                place = f"--effects-from: {effect.name}, {variant.label}"
+                raise InputError(f"{place}: cannot be evaluated ({reason})") from error
+
+
+def _unfitted(kind: Kind, error: SolveError) -> FitError:
+    return FitError(f"{kind.name}: the baseline could not be fitted ({error})")

@@ -1,0 +1,63 @@
+"""A form of an effect in a picture frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import Any
+
+from ....mechanics.laws.law import CrossingLaw, Form
+from ...inference.effects import Effect, Values, Variant
+
+__all__ = ["FrameVariant", "law_effects"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameVariant(Variant):
+    """An effect in a picture frame, as expressions in UFL of its parameters.
+
+    Attributes:
+        laws: laws of a crossing (mechanics.laws) whose moments per area of fabric [N] add.
+        travel: true crosshead displacement [mm] from an object with ``D`` [mm] and ``past`` (the
+            true displacement at the reading before).
+        reading: what the load cell adds [N] at the time t [s].
+        remembers_travel: ``travel`` depends on ``past``.
+        each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
+            has. Those of a holdout run can only come from that run: its error is then what is
+            left after them.
+    """
+
+    laws: Callable[[Values], tuple[Any, ...]] | None = None
+    travel: Callable[[Values, Any, Any], Any] | None = None
+    reading: Callable[[Values, Any], Any] | None = None
+    remembers_travel: bool = False
+    each_run: bool = False
+
+
+def law_effects(
+    laws: Iterable[type[CrossingLaw]], meanings: Mapping[str, str] = MappingProxyType({})
+) -> list[Effect]:
+    """The effects in a picture frame that laws of a crossing are forms of.
+
+    Args:
+        laws: those with forms are taken.
+        meanings: of effects in the order wanted, by their names; others come behind.
+    """
+    found: dict[str, list[tuple[type[CrossingLaw], Form]]] = {name: [] for name in meanings}
+    for law in laws:
+        for form in law.forms:
+            found.setdefault(form.effect, []).append((law, form))
+    effects = []
+    for name, forms in found.items():
+        meaning = meanings.get(name) or next(
+            (form.meaning for _, form in forms if form.meaning), ""
+        )
+        variants = [
+            FrameVariant(form.label, form.parameters, laws=partial(form.laws, law))
+            for law, form in sorted(forms, key=lambda pair: pair[1].rank)
+        ]
+        of_fabric = all(law.of_fabric for law, _ in forms)
+        effects.append(Effect(name, "picture_frame", meaning, tuple(variants), of_fabric))
+    return effects

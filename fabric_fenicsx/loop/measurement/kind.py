@@ -1,0 +1,94 @@
+"""A kind of measurement: all that the loop knows of a test, in one object."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...inputs.groups import Keys
+from ...inputs.tables import Column
+from ..inference.effects import Effect
+from ..inference.experiment import Experiment
+from .schema import Measurement
+
+__all__ = ["Kind", "MadeUp", "Mistake", "called_later"]
+
+Array = npt.NDArray[np.float64]
+Mistake = tuple[str, npt.NDArray[np.bool_], str]
+"""A column, where its readings are wrong, (n,), and what is allowed there."""
+
+
+def called_later(module: str, name: str) -> Callable[..., Any]:
+    """A function or class that is imported when it is called: models need dolfinx."""
+    return lambda *arguments, **named: getattr(import_module(module), name)(*arguments, **named)
+
+
+@dataclass(frozen=True, slots=True)
+class MadeUp:
+    """A test to be measured in the model.
+
+    Attributes:
+        measurement: its runs, in which what is compared has yet to be filled in.
+        experiment: of that measurement.
+        baseline: parameters of its baseline.
+        finer: its readings are this many times finer than they are written.
+        visible: root mean square that a hidden effect leaves of the baseline's best imitation,
+            over noise, where its strength is not given.
+        completed: columns that follow from what the model predicts, from a run's columns and
+            that, (n,).
+    """
+
+    measurement: Measurement
+    experiment: Experiment
+    baseline: Mapping[str, float]
+    finer: int
+    visible: float
+    completed: Callable[[Mapping[str, Array], Array], Mapping[str, Array]] = lambda *_: {}
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of measurement.
+
+    Attributes:
+        name: as ``test`` in a measurement.yaml.
+        rig: keys of its rig.
+        quantity: what is compared, a column; also the key of its noise.
+        label: that, with its unit, as on an axis.
+        columns: of each CSV file.
+        fewest: readings without which a file says nothing.
+        wrong_rig: what is wrong with a rig whose keys are right by themselves, if anything.
+        mistakes: of the readings of a run, from the rig and the columns.
+        experiment: from measurements of this kind and a user's own effects to a model of them.
+        made_up: from a case of this rig to a test that is measured in the model; takes the case,
+            what messages call it, the noise, the readings of a run, the seed, a user's own
+            effects, and its ``options`` by name.
+        options: what only this kind's ``made_up`` takes by name.
+        further_tests: what to measure to tell two effects apart, by their names.
+        needs_others: its model takes what was fitted to kinds before it (``Experiment.take``).
+        scattered: readings lie all over a sheet, on no line.
+    """
+
+    name: str
+    rig: type[Keys]
+    quantity: str
+    label: str
+    columns: tuple[Column, ...]
+    fewest: int
+    wrong_rig: Callable[[Any], str | None]
+    mistakes: Callable[[Any, Mapping[str, Array]], Iterator[Mistake]]
+    experiment: Callable[[Sequence[Measurement], Sequence[Effect]], Experiment]
+    made_up: Callable[..., MadeUp]
+    options: tuple[str, ...] = ()
+    further_tests: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    needs_others: bool = False
+    scattered: bool = False
+
+    def further_test(self, one: str, other: str) -> str | None:
+        """What to measure to tell two effects apart, a sentence; None where nothing is known."""
+        return self.further_tests.get((one, other)) or self.further_tests.get((other, one))

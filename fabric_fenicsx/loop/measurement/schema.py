@@ -1,0 +1,135 @@
+"""What stands in a measurement.yaml, and what becomes of it.
+
+The schema, fabric-measurement/1, is a contract: other programs write it. Units stand in the names
+of keys and columns. What only one kind of measurement has is in that kind's folder.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from ...inputs.groups import Keys, Positive
+from ...rigs.cases import TowKeys
+
+__all__ = [
+    "FILE",
+    "SCHEMA",
+    "FabricKeys",
+    "MeasuredTowKeys",
+    "Measurement",
+    "MeasurementKeys",
+    "Run",
+    "RunKeys",
+    "fabric_keys",
+]
+
+Array = npt.NDArray[np.float64]
+
+SCHEMA = "fabric-measurement/1"
+FILE = "measurement.yaml"
+
+
+class MeasuredTowKeys(Keys):
+    """Section and material of the tows; by default those of Wei & Zhang's Table 3."""
+
+    width_mm: Positive = Field(4.57, description="width of the section in the sheet")
+    height_mm: Positive = Field(0.04, description="height of the section across the sheet")
+    density_kg_mm3: Positive = Field(7.0e-6, description="density")
+    C1_MPa: Positive = Field(60000.0, description="Neo-Hookean constant; E = 6 C1")
+
+
+class FabricKeys(Keys):
+    """The fabric that was tested."""
+
+    areal_density_kg_m2: Positive = Field(description="mass per area")
+    tow_spacing_mm: Positive = Field(12.0, description="of the virtual tows")
+    tow: MeasuredTowKeys = Field(default_factory=MeasuredTowKeys, description="the virtual tows")
+
+
+class RunKeys(Keys):
+    """One file of readings."""
+
+    file: Annotated[str, Field(min_length=1)] = Field(description="a CSV in the folder")
+    role: Literal["fit", "holdout"] = Field(
+        description="holdout: used for nothing but to report an error"
+    )
+    label: str = Field("", description="free text")
+
+
+class MeasurementKeys(Keys):
+    """The content of a measurement.yaml; each kind adds ``test``, ``rig`` and ``noise``."""
+
+    schema_: Literal["fabric-measurement/1"] = Field(alias="schema", description="version")
+    title: str = Field("", description="free text")
+    fabric: FabricKeys = Field(description="the fabric")
+    runs: list[RunKeys] = Field(min_length=1, description="the readings")
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One file of readings.
+
+    Attributes:
+        file: its name.
+        holdout: whether it may only be used to report an error.
+        label: free text.
+        columns: readings by column, each (n,); an empty optional entry is NaN.
+    """
+
+    file: str
+    holdout: bool
+    label: str
+    columns: dict[str, Array]
+
+    @property
+    def count(self) -> int:
+        """Number of readings."""
+        return len(next(iter(self.columns.values())))
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """A test that was measured.
+
+    Attributes:
+        folder: where it was read.
+        test: its kind.
+        title: free text.
+        fabric: what was tested.
+        rig: the rig, keys of the kind.
+        noise: one sigma of a reading of what is compared; None where it is not given.
+        runs: the readings.
+    """
+
+    folder: Path
+    test: str
+    title: str
+    fabric: FabricKeys
+    rig: Any
+    noise: float | None
+    runs: tuple[Run, ...]
+
+
+def fabric_keys(tow: TowKeys, warp_spacing: float, weft_spacing: float) -> FabricKeys:
+    """The fabric of a case: its tows, and what two families of them weigh.
+
+    Args:
+        tow: of the case.
+        warp_spacing: of the warp tows [mm].
+        weft_spacing: of the weft tows [mm].
+    """
+    per_area = 1.0 / warp_spacing + 1.0 / weft_spacing
+    # kg/mm² to kg/m²
+    density = 1e6 * tow.density_kg_mm3 * tow.width_mm * tow.height_mm * per_area
+    keys = {name: getattr(tow, name) for name in MeasuredTowKeys.model_fields}
+    return FabricKeys(
+        areal_density_kg_m2=round(density, 6),
+        tow_spacing_mm=warp_spacing,
+        tow=MeasuredTowKeys(**keys),
+    )
