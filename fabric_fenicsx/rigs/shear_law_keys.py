@@ -97,9 +97,11 @@ class OwnLawKeys(Keys):
         return cast(LawKeys, keys).build(area)
 
 
+NAMED = {of.__name__ + "Keys": _named(of) for of in LAWS.values()}
+# A case goes from rank to rank by pickle, which looks classes up in their module.
+globals().update(NAMED)
+
 if TYPE_CHECKING:
     ShearLawKeys = LawKeys | OwnLawKeys
 else:
-    ShearLawKeys = Annotated[
-        reduce(or_, [*map(_named, LAWS.values()), OwnLawKeys]), Field(discriminator="law")
-    ]
+    ShearLawKeys = Annotated[reduce(or_, [*NAMED.values(), OwnLawKeys]), Field(discriminator="law")]
