@@ -21,10 +21,11 @@ from ufl import as_ufl
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.inputs.keys import documented
+from fabric_fenicsx.loop.kinds.picture_frame import PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.effects import PICTURE_FRAME_EFFECTS
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.variant import FrameVariant
-from fabric_fenicsx.loop.measurement.reading import FabricKeys, Measurement, PictureFrameRig, Run
+from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.mechanics.laws import LAWS
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw, per_area
 from fabric_fenicsx.rigs.cases import CASES, CrossoverKeys
