@@ -9,8 +9,8 @@ import pytest
 from measurements.sets import sixty
 
 from fabric_fenicsx.errors import SolveError
+from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.diagnose import read_measurement
-from fabric_fenicsx.loop.inference.effects import Parameter
 from fabric_fenicsx.loop.inference.experiment import Readings
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.judge import Judge

@@ -173,10 +173,7 @@ def test_a_broken_file_of_effects_is_one_line(old, new, says, tmp_path, capsys):
 def test_a_list_of_effects(effects, says, tmp_path):
     """Beside laws, or instead of them, a file may have a list."""
     path = tmp_path / "mine.py"
-    head = (
-        "from fabric_fenicsx.loop.inference.effects import Effect\n"
-        "from fabric_fenicsx.loop.kinds.picture_frame.variant import FrameVariant\n"
-    )
+    head = "from fabric_fenicsx import Effect, FrameVariant\n"
     path.write_text(f"{head}EFFECTS = {effects}\n")
     with pytest.raises(InputError, match=says):
         read_effects(path)

@@ -112,7 +112,10 @@ def synthesise(
         raise InputError(
             f"{place}: crossover.laws: allowed is none of them here, put effects in as --effect"
         )
-    kind = kind_of(case.test)
+    kind = next((kind for kind in KINDS if kind.name == case.test), None)
+    if kind is None or kind.made_up is None:
+        able = [kind.name for kind in KINDS if kind.made_up is not None]
+        raise InputError(f"{place}: test: {case.test}, allowed is {one_of(able)}")
     for option in of_kind:
         having = [other.name for other in KINDS if option in other.options]
         if kind.name not in having:

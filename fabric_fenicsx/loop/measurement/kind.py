@@ -62,12 +62,12 @@ class Kind:
         label: that, with its unit, as on an axis.
         columns: of each CSV file.
         fewest: readings without which a file says nothing.
+        experiment: from measurements of this kind and a user's own effects to a model of them.
         wrong_rig: what is wrong with a rig whose keys are right by themselves, if anything.
         mistakes: of the readings of a run, from the rig and the columns.
-        experiment: from measurements of this kind and a user's own effects to a model of them.
         made_up: from a case of this rig to a test that is measured in the model; takes the case,
             what messages call it, the noise, the readings of a run, the seed, a user's own
-            effects, and its ``options`` by name.
+            effects, and its ``options`` by name. None: there is no such trial.
         options: what only this kind's ``made_up`` takes by name.
         further_tests: what to measure to tell two effects apart, by their names.
         needs_others: its model takes what was fitted to kinds before it (``Experiment.take``).
@@ -80,10 +80,12 @@ class Kind:
     label: str
     columns: tuple[Column, ...]
     fewest: int
-    wrong_rig: Callable[[Any], str | None]
-    mistakes: Callable[[Any, Mapping[str, Array]], Iterator[Mistake]]
     experiment: Callable[[Sequence[Measurement], Sequence[Effect]], Experiment]
-    made_up: Callable[..., MadeUp]
+    wrong_rig: Callable[[Any], str | None] = lambda rig: None
+    mistakes: Callable[[Any, Mapping[str, Array]], Iterator[Mistake]] = lambda rig, columns: iter(
+        ()
+    )
+    made_up: Callable[..., MadeUp] | None = None
     options: tuple[str, ...] = ()
     further_tests: Mapping[tuple[str, str], str] = field(default_factory=dict)
     needs_others: bool = False

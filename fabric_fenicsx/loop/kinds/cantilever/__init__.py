@@ -47,7 +47,6 @@ CANTILEVER = Kind(
         Column("z_mm"),
     ),
     fewest=3,
-    wrong_rig=lambda rig: None,
     mistakes=_mistakes,
     experiment=called_later(f"{__name__}.model", "Cantilever"),
     made_up=called_later(f"{__name__}.made_up", "made_up"),

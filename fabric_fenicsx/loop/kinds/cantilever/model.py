@@ -24,7 +24,8 @@ from scipy.interpolate import CubicSpline
 from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Parameter, Variant, scaled
-from ...inference.experiment import Law, Readings
+from ...inference.experiment import Law
+from ...measurement.readings import common_noise, readings_of
 from ...measurement.schema import Measurement
 from .effects import CANTILEVER_EFFECTS
 from .hanging import HangingTow, Laws
@@ -89,13 +90,9 @@ class Cantilever:
     notes = ()
 
     def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
-        given = [m.noise for m in measurements if m.noise is not None]
-        # One sigma for all, and only where every folder states its own.
-        known = len(given) == len(measurements)
-        self.noise = float(np.sqrt(np.mean(np.square(given)))) if known else None
+        self.noise = common_noise(measurements)
         self._lay_out(measurements)
         self._compiled: dict[tuple[StripVariant, str], Marched] = {}
-        count = len(self._run)
         slope, self.scatter = self._measured_slopes()
         unknown = np.isnan(self._arc)
         self._steepness = np.where(unknown, np.minimum(np.abs(np.tan(slope)), STEEPEST), 0.0)
@@ -111,21 +108,13 @@ class Cantilever:
             ),
         )
         arc, curvature, moment = self._baseline_lines(start)
-        names = [run.label or run.file for m in measurements for run in m.runs]
-        holdout = np.array([run.holdout for m in measurements for run in m.runs])
-        self.readings = Readings(
-            observed=self._observed,
-            run=self._run,
-            holdout=holdout[self._run],
-            usable=np.ones(count, dtype=bool),
-            weight=1.0 / np.sqrt(1.0 + (self.scatter * self._steepness) ** 2),
-            names=tuple(names),
-            covariates={
-                "arc length [mm]": arc,
-                "length [mm]": self._length,
-                "slope [°]": np.degrees(slope),
-            },
-        )
+        covariates = {
+            "arc length [mm]": arc,
+            "length [mm]": self._length,
+            "slope [°]": np.degrees(slope),
+        }
+        weight = 1.0 / np.sqrt(1.0 + (self.scatter * self._steepness) ** 2)
+        self.readings = readings_of(measurements, self._observed, covariates, weight=weight)
         shares = {"curvature": curvature, "moment": moment}
         self.effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
 

@@ -33,6 +33,7 @@ from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Parameter, Variant
 from ...inference.experiment import Readings
 from ...inference.noise import estimated_noise
+from ...measurement.readings import readings_of
 from ...measurement.schema import Measurement
 from .effects import DRAPE_EFFECTS
 from .shear_field import ShearField, ShearLaw, Solve, drape_case, hermite_weights, solved_field
@@ -174,27 +175,18 @@ class Drape:
         Raises:
             SolveError: a drape stopped before its end.
         """
-        runs = [run for m in self.measurements for run in m.runs]
-        counts = [run.count for run in runs]
         angle = self._column("angle_deg")
         if angle.max() > OBTUSE:
             angle = 90.0 - np.abs(90.0 - angle)
         x, y = self._column("x_mm"), self._column("y_mm")
-        readings = Readings(
-            observed=angle,
-            run=np.repeat(np.arange(len(runs)), counts),
-            holdout=np.repeat([run.holdout for run in runs], counts),
-            usable=np.ones(len(angle), dtype=bool),
-            weight=np.ones(len(angle)),
-            names=tuple(run.label or run.file for run in runs),
-            covariates={
-                "distance from the axis [mm]": np.hypot(x, y),
-                "direction from the warp [°]": np.degrees(np.arctan2(x, y)),
-                "x [mm]": x,
-                "y [mm]": y,
-            },
-            row=np.concatenate(self._order),
-        )
+        covariates = {
+            "distance from the axis [mm]": np.hypot(x, y),
+            "direction from the warp [°]": np.degrees(np.arctan2(x, y)),
+            "x [mm]": x,
+            "y [mm]": y,
+        }
+        row = np.concatenate(self._order)
+        readings = readings_of(self.measurements, angle, covariates, row=row)
         sigma = self.sigma
         noise = self.noise
         if noise is None:

@@ -28,8 +28,8 @@ from ....mechanics.laws.springs import PolynomialSpring
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Variant, scaled
-from ...inference.experiment import Readings
 from ...inference.noise import estimated_noise
+from ...measurement.readings import common_noise, readings_of
 from ...measurement.schema import Measurement
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
@@ -60,7 +60,7 @@ class PictureFrame:
     notes = ()
 
     def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
-        self.noise = _common_noise(measurements)
+        self.noise = common_noise(measurements)
         runs = [(m, run) for m in measurements for run in m.runs]
         motions = [
             frame_motion(
@@ -77,18 +77,15 @@ class PictureFrame:
         kinematics = self._kinematics(self._travel(None, {}), {})
         gamma, rate = (self._at_readings(kinematics[key].value) for key in ("gamma", "rate"))
         time = self._at_readings(self._points["time"].value)
-        self.readings = Readings(
-            observed=np.concatenate([run.columns["force_N"] for _, run in runs]),
-            run=np.repeat(np.arange(len(runs)), [run.count for _, run in runs]),
-            holdout=np.repeat([run.holdout for _, run in runs], [run.count for _, run in runs]),
-            usable=np.concatenate([p.certain for p in motions]),
-            weight=np.ones(sum(run.count for _, run in runs)),
-            names=tuple(run.label or run.file for _, run in runs),
-            covariates={
+        self.readings = readings_of(
+            measurements,
+            np.concatenate([run.columns["force_N"] for _, run in runs]),
+            {
                 "shear angle [°]": np.degrees(gamma),
                 "shear rate [°/s]": np.degrees(rate),
                 "time [s]": time,
             },
+            usable=np.concatenate([p.certain for p in motions]),
         )
         rate_error = np.concatenate([p.rate_error for p in motions])
         self._leave_out_uncertain(
@@ -330,11 +327,3 @@ def _remembered(marched: Marched, number: int, name: str) -> Any:
 def _shifted(values: Array) -> Array:
     """At the point before; at the first point the value there."""
     return np.concatenate([values[:1], values[:-1]])
-
-
-def _common_noise(measurements: Sequence[Measurement]) -> float | None:
-    """The sigma that all folders give; None unless they all do."""
-    given = [m.noise for m in measurements if m.noise is not None]
-    if len(given) < len(measurements):
-        return None
-    return float(np.sqrt(np.mean(np.square(given))))

@@ -1,0 +1,54 @@
+"""From measurements to the readings that the search compares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..inference.experiment import Readings
+from .schema import Measurement
+
+__all__ = ["common_noise", "readings_of"]
+
+Array = npt.NDArray[np.float64]
+
+
+def readings_of(
+    measurements: Sequence[Measurement],
+    observed: Array,
+    covariates: Mapping[str, Array],
+    **more: Any,
+) -> Readings:
+    """The readings of all runs, in their order.
+
+    Args:
+        measurements: the folders.
+        observed: what is compared, (n,).
+        covariates: what a residual is shown against, by name with unit, (n,) each.
+        more: further attributes of Readings; by default all are usable and weigh the same.
+    """
+    runs = [run for m in measurements for run in m.runs]
+    counts = [run.count for run in runs]
+    given: dict[str, Any] = {
+        "usable": np.ones(len(observed), dtype=bool),
+        "weight": np.ones(len(observed)),
+    }
+    return Readings(
+        observed=observed,
+        run=np.repeat(np.arange(len(runs)), counts),
+        holdout=np.repeat([run.holdout for run in runs], counts),
+        names=tuple(run.label or run.file for run in runs),
+        covariates=covariates,
+        **(given | more),
+    )
+
+
+def common_noise(measurements: Sequence[Measurement]) -> float | None:
+    """One sigma for all folders, the root mean square of theirs; None unless each has one."""
+    given = [m.noise for m in measurements if m.noise is not None]
+    if len(given) < len(measurements):
+        return None
+    return float(np.sqrt(np.mean(np.square(given))))
