@@ -225,26 +225,28 @@ class Model:
             values[part] = wanted - u[self._place[support.nodes[own]], component]
         return values
 
-    def set_time(self, start: float, end: float, last: float = 0.0) -> None:
-        """Move the tools to their places at the end of the step and set what depends on Δt.
-
-        Args:
-            start: of the step [s].
-            end: of the step [s].
-            last: length of the step before [s]; 0 where strain rates are to be backward differences
-                over this step alone.
-        """
+    def set_time(self, start: float, end: float) -> None:
+        """Move the tools to their places at the end of the step and set what depends on Δt."""
         self.time = start
         self.set_load(end)
-        fields, ratio = self.fields, (end - start) / last if last else 0.0
-        factor, extrapolated = backward_difference(ratio)
-        self.relaxation.value = factor * self.viscosity / (end - start)
-        now, before = (field.x.array for field in (fields.strain_n, fields.strain_before))
-        fields.strain_star.x.array[:] = now + extrapolated * (now - before)
+        self.set_strain_rates(end - start)
         if self.crossings is not None:
             self.crossings.set_step(end - start)
         if self.contacts is not None:
             self.contacts.set_time(start, end)
+
+    def set_strain_rates(self, length: float, last: float = 0.0) -> None:
+        """How the viscosity takes rates at the end of a step, see ``backward_difference``.
+
+        Args:
+            length: of the step [s].
+            last: of the step before [s]; 0 leaves that one out.
+        """
+        fields = self.fields
+        factor, extrapolated = backward_difference(length / last if last else 0.0)
+        self.relaxation.value = factor * self.viscosity / length
+        now, before = (field.x.array for field in (fields.strain_n, fields.strain_before))
+        fields.strain_star.x.array[:] = now + extrapolated * (now - before)
 
     def set_load(self, time: float) -> None:
         """The weight at a time."""

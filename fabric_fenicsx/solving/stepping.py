@@ -215,9 +215,9 @@ class Stepper:
     def try_step(self, h: float) -> Outcome:
         """Attempt a step of length h from the accepted state."""
         net, state, model = self.net, self.state, self.model
-        last = 0.0 if self.alpha is None else state.last_step
-        model.set_time(state.time, state.time + h, last)
+        model.set_time(state.time, state.time + h)
         if self.alpha is not None:
+            model.set_strain_rates(h, state.last_step)
             model.set_rates(*self.alpha.rates(h), self._turn(h))
             v_star, a_star, _ = self._known_rates(self.alpha, h)
             net.tows.rate_star.x.array[:] = v_star.ravel()
