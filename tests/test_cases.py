@@ -273,7 +273,7 @@ assert not heavy, heavy
 
 
 def test_a_sheet_is_checked_with_its_own_weave(tmp_path):
-    """Its spacings, whatever those of the sheet, and its outline; the file of a pattern is not read."""
+    """Its spacings, whatever those of the sheet; the file of a pattern is not read."""
     sheet = "test: drape\nsymmetry: none\nsheet: {width_mm: 20, length_mm: 20}\n"
     small = "weave: {pattern: nothing.txt, warp_spacings_mm: [4], weft_spacings_mm: [4]}\n"
     assert load_case(written(tmp_path, sheet + small)).weave is not None
