@@ -484,6 +484,8 @@ def test_a_law_of_ones_own_in_a_case(tmp_path):
             "B, Stitches, allowed is one",
         ),
         ("# %%\nfrom", "1 / 0\nfrom", "mine.py: ZeroDivisionError"),
+        ("(self.limit) * tanh", "(self.limit) * tan", "Stitches cannot be evaluated (NameError"),
+        ("* ln(cosh", "* lm(cosh", "Stitches cannot be evaluated (NameError"),
     ],
 )
 def test_a_bad_law_of_ones_own_is_one_line(old, new, says, tmp_path):

@@ -702,7 +702,7 @@ def test_demo(tmp_path, demo):
 def test_demo_draws(tmp_path, demo):
     fabric = demo.FABRICS["plain"]
     net = demo.net_of(fabric, tmp_path / "plain.msh")
-    demo.draw_weave(
+    demo.ff.draw_weave(
         tmp_path / "plain.png",
         net,
         width=fabric.width,

@@ -12,13 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
 from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
+from ufl import as_ufl
 
 from ..errors import InputError
 from ..inputs.groups import Keys
 from ..inputs.python_file import classes_of, run_file
 from ..inputs.validation import mistakes
 from ..mechanics.laws import LAWS
-from ..mechanics.laws.law import CrossingLaw
+from ..mechanics.laws.law import Crossing, CrossingLaw
+from ..mechanics.scalars import symbol
 
 __all__ = ["ShearLawKeys"]
 
@@ -84,7 +86,8 @@ class OwnLawKeys(Keys):
         """The law of a crossing that stands for ``area`` [mm²].
 
         Raises:
-            InputError: the file cannot be run, or its law does not take these values.
+            InputError: the file cannot be run, or its law does not take these values, or has no
+                moment with them.
         """
         path = Path(self.file)
         laws = classes_of(run_file(path, "a subclass of CrossingLaw"), CrossingLaw)
@@ -94,7 +97,17 @@ class OwnLawKeys(Keys):
         keys, problems = mistakes(_keys(laws[0]), self.values)
         if problems:
             raise InputError(f"values: {problems[0][1]}")
-        return cast(LawKeys, keys).build(area)
+        law = cast(LawKeys, keys).build(area)
+        gamma, before, per_time = (symbol() for _ in range(3))
+        at = Crossing(gamma, before, per_time, lambda value: value, lambda name: symbol())
+        try:
+            law.energy_and_loss(at, as_ufl(law.moment(at)))
+        except Exception as error:
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            raise InputError(
+                f"{path}: {laws[0].__name__} cannot be evaluated ({reason})"
+            ) from error
+        return law
 
 
 NAMED = {of.__name__ + "Keys": _named(of) for of in LAWS.values()}
