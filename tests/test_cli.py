@@ -31,7 +31,7 @@ points: [{x_mm: 10, y_mm: 10, measured_deg: 88, std_deg: 1, paper_deg: 87}]
 # A stiff punch wider than the hole crushes the fabric against the die.
 IMPOSSIBLE = [
     *("--set", "punch_radius_mm=40", "--set", "punch_travel_mm=40", "--set", "duration_s=4"),
-    *("--set", "contact.stiffness_N_mm2=50", "--set", "solver.smallest_step_s=0.002"),
+    *("--set", "contact.stiffness_N_mm2=500", "--set", "solver.smallest_step_s=0.002"),
 ]
 
 MPI = {
