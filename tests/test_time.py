@@ -4,11 +4,21 @@ import numpy as np
 import pytest
 import reference
 from scipy.linalg import eigh
-from solve import GivenSection, orders, random_rotation, set_loads, taylor_remainders
+from solve import (
+    GivenSection,
+    orders,
+    plain_net,
+    random_rotation,
+    set_loads,
+    taylor_remainders,
+)
 
 from fabric_fenicsx.fabric.net import single_tow
+from fabric_fenicsx.mechanics.laws.dashpots import EyringDashpot
+from fabric_fenicsx.mechanics.laws.maxwell import Maxwell
 from fabric_fenicsx.solving.generalised_alpha import GeneralisedAlpha, backward_difference
 from fabric_fenicsx.solving.model import NEGLIGIBLE_RATE, Model, Support
+from fabric_fenicsx.solving.parts import CrossoverLaw
 from fabric_fenicsx.solving.stepping import StepControl, Stepper
 
 CLAMPED = (0, 1, 2, 3, 4, 5)
@@ -381,6 +391,47 @@ def test_places_and_velocities_are_of_second_order(radius, viscosity):
     assert np.linalg.norm(ends[-1][0]) > 1.0
     differences = np.linalg.norm(np.diff(ends, axis=0), axis=2)
     rates = orders(differences)
+    assert rates[-1] == pytest.approx(2.0, abs=0.1), f"orders {rates}"
+
+
+def crossed(radius, steps, laws):
+    """Shear angle where two tows cross, pulled at one's end for a second; steps alternate as 1 : 3.
+
+    Returns:
+        The angle at the end [rad], and the largest on the way.
+    """
+    net = plain_net(1, 1, 4.0, 1)
+    model = Model(
+        net,
+        GivenSection((80.0, 40.0, 40.0, 12.0, 10.0, 20.0), (1.0, 0.3, 0.3, 0.4)),
+        crossovers=CrossoverLaw(50.0, 4.0, 0.0, 8.0, 20.0, laws=laws),
+        inertia=GeneralisedAlpha(radius),
+        viscosity=0.1,
+        supports=[Support(net.ends[:, 0], (0, 1, 2))],
+    )
+    stepper = start(model, np.zeros((len(net.points), 6)), force_tolerance=1e-9)
+    lengths, angles = np.resize((1.0, 3.0), steps), []
+    for length in lengths / lengths.sum():
+        now = stepper.state.time + length
+        pull = np.sin(np.pi * now) ** 2 * np.array([24, 12, 6, 0, 0, 0])
+        set_loads(model, int(net.ends[0, 1]), pull)
+        assert stepper.try_step(length).converged
+        angles.append(float(model.shear_angles()[0]))
+        stepper.advance(length)
+    return angles[-1], max(map(abs, angles))
+
+
+@pytest.mark.parametrize(
+    "laws",
+    [(), (Maxwell(6.0, 0.2),), (EyringDashpot(3.0, 1.0),)],
+    ids=["dashpot", "with a Maxwell branch", "with Eyring's"],
+)
+@pytest.mark.parametrize("radius", [0.0, 0.9])
+def test_rates_at_a_crossing_are_of_second_order(radius, laws):
+    # With the plain quotient of a step as rate the last order is 1.2.
+    runs = [crossed(radius, n, laws) for n in (80, 160, 320)]
+    assert runs[-1][1] > 0.05
+    rates = orders(np.abs(np.diff([angle for angle, _ in runs])))
     assert rates[-1] == pytest.approx(2.0, abs=0.1), f"orders {rates}"
 
 

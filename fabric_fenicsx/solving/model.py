@@ -229,14 +229,12 @@ class Model:
         """Move the tools to their places at the end of the step and set what depends on Δt."""
         self.time = start
         self.set_load(end)
-        self.set_strain_rates(end - start)
-        if self.crossings is not None:
-            self.crossings.set_step(end - start)
+        self.set_rates_of_change(end - start)
         if self.contacts is not None:
             self.contacts.set_time(start, end)
 
-    def set_strain_rates(self, length: float, last: float = 0.0) -> None:
-        """How the viscosity takes rates at the end of a step, see ``backward_difference``.
+    def set_rates_of_change(self, length: float, last: float = 0.0) -> None:
+        """How viscosity and crossings take rates in a step, see ``backward_difference``.
 
         Args:
             length: of the step [s].
@@ -247,6 +245,8 @@ class Model:
         self.relaxation.value = factor * self.viscosity / length
         now, before = (field.x.array for field in (fields.strain_n, fields.strain_before))
         fields.strain_star.x.array[:] = now + extrapolated * (now - before)
+        if self.crossings is not None:
+            self.crossings.set_step(length, last)
 
     def set_load(self, time: float) -> None:
         """The weight at a time."""

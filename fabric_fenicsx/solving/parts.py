@@ -19,6 +19,7 @@ from ..mechanics.laws.springs import PolynomialSpring
 from ..mechanics.terms import Term, energy_term, work_term
 from ..mechanics.tools import SampledTool, Tool
 from .discretisation import BLOCK, Discretisation
+from .generalised_alpha import backward_difference
 from .history import Histories
 from .pressed import PressedTool
 
@@ -96,11 +97,15 @@ class Crossings:
             return _dolfinx.constant(fields.mesh, value)
 
         self._space = _dolfinx.constants_per_cell(fields.mesh, 1)
-        self.per_time = number(1.0)
+        self.per_time, self.rate_factor, self.extrapolated = (number(1.0) for _ in range(3))
         change = crossover.shear_angle_change(fields)
         gamma = variable(change.value)
-        gamma_n = Function(self._space)
-        remembered: list[tuple[str, Any, Any]] = [("shear angle", gamma_n, gamma)]
+        gamma_n, before = Function(self._space), Function(self._space)
+        rate = self.rate_factor * (gamma - gamma_n - self.extrapolated * (gamma_n - before))
+        remembered: list[tuple[str, Any, Any]] = [
+            ("shear angle", gamma_n, gamma),
+            ("shear angle before", before, gamma_n),
+        ]
         self.terms = [
             self._springs(law, number, remembered),
             crossover.alignment_term(fields, number(law.alignment)),
@@ -112,7 +117,7 @@ class Crossings:
             def past(name: str, memory: dict[str, Function] = memory) -> Function:
                 return memory.setdefault(name, Function(self._space))
 
-            at = Crossing(gamma, gamma_n, self.per_time, number, past)
+            at = Crossing(gamma, gamma_n, self.per_time, number, past, rate)
             moment = piece.moment(at)
             share = fields.interlacing if piece.interlaced else fields.patch
             moments.append(share * moment)
@@ -165,10 +170,16 @@ class Crossings:
             crossover.crossing_values(fields, expression, self._space), comm
         )
 
-    def set_step(self, length: float) -> None:
-        """Δt [s] of the step to come."""
+    def set_step(self, length: float, last: float = 0.0) -> None:
+        """How laws take rates in the step to come, see ``backward_difference``.
+
+        Args:
+            length: Δt [s].
+            last: of the step before [s]; 0 leaves that one out.
+        """
         if self.disc.connectors is not None:
-            self.per_time.value = 1.0 / length
+            factor, self.extrapolated.value = backward_difference(length / last if last else 0.0)
+            self.per_time.value, self.rate_factor.value = 1.0 / length, factor / length
 
     def angles(self) -> Array:
         """Shear angle γ at each crossing of the net [rad], on every rank. Collective."""

@@ -217,7 +217,7 @@ class Stepper:
         net, state, model = self.net, self.state, self.model
         model.set_time(state.time, state.time + h)
         if self.alpha is not None:
-            model.set_strain_rates(h, state.last_step)
+            model.set_rates_of_change(h, state.last_step)
             model.set_rates(*self.alpha.rates(h), self._turn(h))
             v_star, a_star, _ = self._known_rates(self.alpha, h)
             net.tows.rate_star.x.array[:] = v_star.ravel()

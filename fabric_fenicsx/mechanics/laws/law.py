@@ -48,7 +48,7 @@ class Crossing:
             needs no compilation.
         past: history value by name, zero at first; what it becomes is the law's ``history``.
         known_rate: γ̇ at the end of the step [rad/s] where it is known better than by the
-            difference quotient, as in a prescribed motion.
+            difference quotient, as in a prescribed motion or from the step before.
     """
 
     gamma: Any
