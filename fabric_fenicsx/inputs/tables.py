@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ..errors import InputError
 from .keys import one_of, plain
-from .validation import one_line, refuse_devices, suggestion
+from .validation import one_line, read_text, suggestion
 
 __all__ = ["Column", "read_table"]
 
@@ -74,19 +74,7 @@ def read_table(path: Path, columns: Sequence[Column], fewest: int) -> dict[str, 
 
 def _cells(path: Path) -> list[list[str]]:
     """The cells of a CSV file, the column names first."""
-    try:
-        refuse_devices(path)
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder, allowed is a CSV that `runs` names")
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file, allowed is a CSV that `runs` names") from None
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path}: not UTF-8 text at byte {error.start}, allowed is a CSV file"
-        ) from None
-    except (OSError, ValueError) as error:
-        raise InputError(one_line(f"{path}: cannot be read ({error})")) from None
+    text = read_text(path, "a CSV that `runs` names")
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if not lines:
         raise InputError(f"{path}: empty, allowed is a CSV file with a line of column names")

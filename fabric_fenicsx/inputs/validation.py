@@ -20,8 +20,8 @@ __all__ = [
     "one_line",
     "parse_yaml",
     "read_keys",
+    "read_text",
     "read_yaml",
-    "refuse_devices",
     "suggestion",
 ]
 
@@ -55,31 +55,39 @@ def read_yaml(path: Path, what: str) -> Any:
     Raises:
         InputError: one line that names the file.
     """
-    try:
-        text = path.read_bytes().decode("utf-8")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file, allowed is {what} (YAML)") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder, allowed is {what} (YAML)") from None
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path}: not UTF-8 text at byte {error.start}, allowed is {what} (YAML)"
-        ) from None
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read ({error.strerror}), allowed is {what} (YAML)"
-        ) from None
+    text = read_text(path, f"{what} (YAML)")
     return parse_yaml(text, str(path), places=True)
 
 
-def refuse_devices(path: Path) -> None:
-    """A pipe or a device may never end.
+def read_text(path: Path, what: str) -> str:
+    """The content of a text file.
+
+    Args:
+        path: the file.
+        what: what such a file is, for the message.
 
     Raises:
-        InputError: it is one.
+        InputError: one line that names the file.
     """
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise InputError(f"{path}: is a pipe or a device, allowed is a file")
+    try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            # It may never end.
+            raise InputError(f"{path}: is a pipe or a device, allowed is {what}")
+        return path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file, allowed is {what}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder, allowed is {what}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path}: not UTF-8 text at byte {error.start}, allowed is {what}"
+        ) from None
+    except (OSError, ValueError) as error:
+        # A name of a file that cannot be is a ValueError.
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            one_line(f"{path}: cannot be read ({reason}), allowed is {what}")
+        ) from None
 
 
 def read_keys(
@@ -97,7 +105,6 @@ def read_keys(
     Raises:
         InputError: one line that names the file, the key and what is allowed.
     """
-    refuse_devices(path)
     data = read_yaml(path, what)
     if not isinstance(data, dict):
         raise InputError(f"{path}: {plain(data)}, allowed is a mapping of keys")
