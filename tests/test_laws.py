@@ -486,6 +486,11 @@ def test_a_law_of_ones_own_in_a_case(tmp_path):
         ("# %%\nfrom", "1 / 0\nfrom", "mine.py: ZeroDivisionError"),
         ("(self.limit) * tanh", "(self.limit) * tan", "Stitches cannot be evaluated (NameError"),
         ("* ln(cosh", "* lm(cosh", "Stitches cannot be evaluated (NameError"),
+        (
+            "* tanh(at.gamma",
+            "* __import__('math').tanh(at.gamma",
+            "takes a number of an expression",
+        ),
     ],
 )
 def test_a_bad_law_of_ones_own_is_one_line(old, new, says, tmp_path):

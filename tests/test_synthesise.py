@@ -143,8 +143,10 @@ def test_a_hidden_turn_of_a_clamp_is_found(tmp_path):
         (
             "(self.limit) * tanh",
             "(self.limit) * tan",
-            "stitch_tightening, tanh: cannot be evaluated",
+            "stitch_tightening, tanh: Stitches cannot be evaluated",
         ),
+        ("tanh(at.gamma", "__import__('math').tanh(at.gamma", "a number of an expression"),
+        ('"limit": ff.Parameter', '"limt": ff.Parameter', "stitch_tightening, tanh: "),
         ("    forms = (", "    fforms = (", "no effects, allowed is a CrossingLaw with forms"),
         ("ln, tanh", "ln, tan_h", "ImportError"),
     ],
@@ -177,7 +179,11 @@ def test_a_list_of_effects(effects, says, tmp_path):
     path.write_text(f"{head}EFFECTS = {effects}\n")
     with pytest.raises(InputError, match=says):
         read_effects(path)
-    path.write_text(OWN.read_text() + head + "EFFECTS = [Effect('x', 'picture_frame', '', ())]\n")
+    path.write_text(
+        OWN.read_text()
+        + head
+        + "EFFECTS = [Effect('x', 'picture_frame', '', (FrameVariant('y', ()),))]\n"
+    )
     assert [effect.name for effect in read_effects(path)] == ["stitch_tightening", "x"]
 
 

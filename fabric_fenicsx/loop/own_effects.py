@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import InputError
 from ..inputs.keys import one_of
 from ..inputs.python_file import classes_of, run_file
 from ..mechanics.laws.law import CrossingLaw
-from .inference.effects import Effect
+from ..mechanics.laws.trial import try_out
+from .inference.effects import Effect, Variant
 from .kinds import KINDS
 from .kinds.picture_frame.variant import law_effects
 
@@ -28,12 +30,29 @@ def read_effects(path: Path) -> list[Effect]:
     effects = getattr(module, "EFFECTS", ())
     if not isinstance(effects, (list, tuple)) or not all(isinstance(e, Effect) for e in effects):
         raise InputError(f"{path}: EFFECTS, allowed is a list of Effect")
-    effects = [*law_effects(classes_of(module, CrossingLaw)), *effects]
+    laws = classes_of(module, CrossingLaw)
+    for own, form in [(law, form) for law in laws for form in law.forms]:
+        values = {p.name: (p.starts or (1.0,))[0] for p in form.parameters}
+        try:
+            for one in form.laws(own, values):
+                try_out(one)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{path}: {form.effect}, {form.label}: {error}") from error
+    effects = [*law_effects(laws), *effects]
     if not effects:
         raise InputError(
             f"{path}: no effects, allowed is a CrossingLaw with forms, or a list EFFECTS"
         )
     for effect in effects:
+        forms = effect.variants
+        if (
+            not isinstance(forms, Sequence)
+            or not forms
+            or any(not isinstance(form, Variant) for form in forms)
+        ):
+            raise InputError(
+                f"{path}: {effect.name}: variants, allowed is one form or more of them"
+            )
         tests = [kind.name for kind in KINDS]
         if effect.test not in tests:
             raise InputError(

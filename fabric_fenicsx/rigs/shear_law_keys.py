@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
 from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
-from ufl import as_ufl
 
 from ..errors import InputError
 from ..inputs.groups import Keys
 from ..inputs.python_file import classes_of, run_file
 from ..inputs.validation import mistakes
 from ..mechanics.laws import LAWS
-from ..mechanics.laws.law import Crossing, CrossingLaw
-from ..mechanics.scalars import symbol
+from ..mechanics.laws.law import CrossingLaw
+from ..mechanics.laws.trial import try_out
 
 __all__ = ["ShearLawKeys"]
 
@@ -98,15 +97,10 @@ class OwnLawKeys(Keys):
         if problems:
             raise InputError(f"values: {problems[0][1]}")
         law = cast(LawKeys, keys).build(area)
-        gamma, before, per_time = (symbol() for _ in range(3))
-        at = Crossing(gamma, before, per_time, lambda value: value, lambda name: symbol())
         try:
-            law.energy_and_loss(at, as_ufl(law.moment(at)))
-        except Exception as error:
-            reason = " ".join(f"{type(error).__name__}: {error}".split())
-            raise InputError(
-                f"{path}: {laws[0].__name__} cannot be evaluated ({reason})"
-            ) from error
+            try_out(law)
+        except ValueError as error:
+            raise InputError(f"{path}: {error}") from error
         return law
 
 

@@ -20,8 +20,8 @@ class FrameVariant(Variant):
 
     Attributes:
         laws: laws of a crossing (mechanics.laws) whose moments per area of fabric [N] add.
-        travel: true crosshead displacement [mm] from an object with ``D`` [mm] and ``past`` (the
-            true displacement at the reading before).
+        travel: true crosshead displacement [mm] from the parameters, the crosshead's place D [mm]
+            and the true displacement at the reading before, None unless ``remembers_travel``.
         reading: what the load cell adds [N] at the time t [s].
         remembers_travel: ``travel`` depends on ``past``.
         each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
