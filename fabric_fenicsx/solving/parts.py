@@ -97,7 +97,7 @@ class Crossings:
             return _dolfinx.constant(fields.mesh, value)
 
         self._space = _dolfinx.constants_per_cell(fields.mesh, 1)
-        self.per_time, self.rate_factor, self.extrapolated = (number(1.0) for _ in range(3))
+        self.per_time, self.rate_factor, self.extrapolated = map(number, (1.0, 1.0, 0.0))
         change = crossover.shear_angle_change(fields)
         gamma = variable(change.value)
         gamma_n, before = Function(self._space), Function(self._space)
