@@ -61,10 +61,10 @@ from .rigs.load import load_case as load_case
 from .rigs.run import make_case as make_case
 from .rigs.run import run as run
 from .rigs.simulation import simulate as simulate
+from .solving.contacts import ContactLaw as ContactLaw
 from .solving.generalised_alpha import GeneralisedAlpha as GeneralisedAlpha
 from .solving.model import Model as Model
 from .solving.model import Support as Support
-from .solving.parts import ContactLaw as ContactLaw
 from .solving.parts import CrossoverLaw as CrossoverLaw
 from .solving.stepping import StepControl as StepControl
 

@@ -15,8 +15,9 @@ from fabric_fenicsx.geometry.distance import DistanceGrid, exact_distance
 from fabric_fenicsx.geometry.triangles import Triangles, read_stl, write_stl
 from fabric_fenicsx.mechanics.tools import Mould, Sphere
 from fabric_fenicsx.rigs.drape import DrapeCase, tools
+from fabric_fenicsx.solving.contacts import ContactLaw
 from fabric_fenicsx.solving.model import Model, Support
-from fabric_fenicsx.solving.parts import ContactLaw, CrossoverLaw
+from fabric_fenicsx.solving.parts import CrossoverLaw
 
 MESHES = Path(__file__).parents[1] / "meshes"
 RADIUS = 30.0

@@ -20,8 +20,8 @@ from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.common import Session
 from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
+from fabric_fenicsx.solving.contacts import ContactLaw
 from fabric_fenicsx.solving.model import Model, Support
-from fabric_fenicsx.solving.parts import ContactLaw
 
 SECTION = RectangularSection(width=4.57, height=0.04, density=7e-9, C1=60000.0)
 LENGTH = 40.0

@@ -28,8 +28,8 @@ from .weave_keys import SheetKeys, WeaveKeys, crossing_weights, layout
 
 if TYPE_CHECKING:
     from ..mechanics.tools import Tool
+    from ..solving.contacts import ContactLaw
     from ..solving.model import Model, Support
-    from ..solving.parts import ContactLaw
     from ..solving.snapshot import Snapshot
     from .common import Session
     from .simulation import Run
@@ -218,7 +218,7 @@ def symmetry_planes(net: Net) -> list[Support]:
 
 def contact_law(keys: ContactKeys) -> ContactLaw:
     """Pressure and friction law of the case."""
-    from ..solving.parts import ContactLaw
+    from ..solving.contacts import ContactLaw
 
     return ContactLaw(
         keys.stiffness_N_mm2,

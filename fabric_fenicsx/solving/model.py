@@ -20,11 +20,12 @@ from ..mechanics.fields import ConnectorFields, TowFields
 from ..mechanics.section_laws import with_viscosity
 from ..mechanics.terms import Term, work_term
 from ..mechanics.tools import Tool
+from .contacts import ContactLaw, Contacts
 from .discretisation import BLOCK, Discretisation
 from .generalised_alpha import GeneralisedAlpha, backward_difference
 from .history import Histories
 from .newton import Newton
-from .parts import ContactLaw, Contacts, Crossings, CrossoverLaw
+from .parts import Crossings, CrossoverLaw
 from .sections import SectionLawName, diagonals, elastic_section
 from .snapshot import Snapshot
 from .system import System
@@ -293,6 +294,14 @@ class Model:
         inertia = c_0 * float(self.mass_scale.value) * self.mass[:, 1:]
         rate = turn * inertia.max(axis=1) / (inertia.min(axis=1) + self._bending)
         self.system.gyroscopic = bool(rate.max() > NEGLIGIBLE_RATE)
+
+    def firm_up(self) -> str:
+        """Stiffen the contact where the step that has converged sank in too deep. Collective.
+
+        Returns:
+            Where it did, for it has to be solved again; empty where nothing did.
+        """
+        return "" if self.contacts is None else self.contacts.firm_up()
 
     def remember(self) -> None:
         """Update what the next step starts from, with the increment still in the fields."""

@@ -138,18 +138,19 @@ class Newton:
             pc.setPythonContext(DyadicLU(self._free_dyads, prefix))
         return snes
 
-    def solve(self, targets: npt.NDArray[np.float64]) -> Outcome:
+    def solve(self, targets: npt.NDArray[np.float64], *, again: bool = False) -> Outcome:
         """Solve for the increment, starting from the values in ``x``.
 
         Args:
             targets: prescribed increments of the fixed rows, shape (n_fixed,).
+            again: x is what the last solve of the same step has found.
 
         Returns:
             How it ended; the increment stands in ``x`` and in the system's fields.
         """
         self._target = targets
         self._history = []
-        self._fresh = True
+        self._fresh = not again
         self._refused = ""
         start = perf_counter()
         before = self.system.assemble_seconds
