@@ -42,9 +42,9 @@ VARIATIONS: dict[str, list[str]] = {
     "holder closed from the start": ["holder_gap_start_mm=-0.2"],
     "holder gap -0.4 mm": ["holder_gap_mm=-0.4"],
     "holder closes in 20 s": ["holder_closing_s=20"],
-    "contact half as stiff": ["contact.stiffness_N_mm2=0.25"],
-    "contact twice as stiff": ["contact.stiffness_N_mm2=1"],
-    "contact layer 0.25 mm": ["contact.layer_mm=0.25"],
+    "contact half as stiff": ["contact.stiffness_N_mm2=0.5"],
+    "contact twice as stiff": ["contact.stiffness_N_mm2=2"],
+    "contact layer 0.5 mm": ["contact.layer_mm=0.5"],
     "four cells per spacing": ["sheet.subdivisions=4"],
     "steps of at most 0.25 s": ["solver.largest_step_s=0.25"],
 }

@@ -7,15 +7,16 @@
 k (d − δ/2), is continuous with its first derivative. With a corner in it Newton falls into a cycle
 of the same nodes going in and out of contact.
 
-k belongs to a node and a tool and follows the load from step to step, so that d stays below δ/2:
-where d has left a band about d* it becomes what gives the same pressure at d*,
+k belongs to a node and a tool and follows the load, so that d stays below δ/2: where d comes near
+that, k becomes what gives the same pressure at a lesser penetration d*,
 
-    k ← max(k_0, k φ′(d)/φ′(d*)),
+    k ← k φ′(d)/φ′(d*),
 
-as penalties are scaled in augmented Lagrangian methods (Bertsekas, Constrained Optimization and
-Lagrange Multiplier Methods, 1982, section 2.2.5), with the pressure itself as the multiplier that
-is kept. Within a step k is constant and contact stores energy. A change of k at the penetration d_n
-puts (k − k_n) φ(d_n) into the store that came from nowhere: booked as a negative loss.
+as penalties grow in augmented Lagrangian methods where the constraint's violation does not fall
+(Bertsekas, Constrained Optimization and Lagrange Multiplier Methods, 1982, section 2.2.5). A
+multiplier beside it was tried and left out: near the tool it presses on nodes that do not touch it.
+A change of k at the penetration d_n puts (k − k_n) φ(d_n) into the store that nothing has worked
+for: booked as a negative loss.
 """
 
 from __future__ import annotations
@@ -23,13 +24,11 @@ from __future__ import annotations
 from typing import Any
 
 from ufl import (
-    And,
     as_vector,
     conditional,
     diff,
     dot,
-    ge,
-    le,
+    gt,
     lt,
     max_value,
     min_value,
@@ -56,9 +55,10 @@ __all__ = [
 #: Penetration over the layer that no accepted step exceeds in any node.
 LIMIT = 0.5
 
-#: Penetrations over the layer between which a node's stiffness is left alone, and the one it goes
-#: back to from outside of them. From the upper one a load may double before the limit is reached.
-BAND, AIM = (0.1, 0.35), 0.25
+#: Penetrations over the layer beyond which the stiffness of a node grows at the end of a step, and
+#: at which the pressure is then the same. Apart enough that it grows seldom, near enough that
+#: Newton's method hardly feels it: every change takes the next step some iterations.
+NEAR_LIMIT, AIM = 0.45, 0.4
 
 #: Length [mm] that rounds the roots of the distance functions where they have a corner (on the
 #: tool's axis, and in the core of the rounded edge, which no fabric reaches).
@@ -89,18 +89,10 @@ def pressure(d: Any, stiffness: Any, layer: Any) -> Any:
     return conditional(lt(d, layer), stiffness * d**2 / (2 * layer), stiffness * (d - layer / 2))
 
 
-def followed(d: Any, stiffness: Any, least: Any, layer: Any) -> Any:
-    """The stiffness k [N/mm²] of the next step from the penetration d [mm] and k of this one.
-
-    Args:
-        d: >= 0 [mm].
-        stiffness: k.
-        least: k_0, that of a node without a load.
-        layer: δ [mm].
-    """
-    lower, upper = (share * layer for share in BAND)
+def followed(d: Any, stiffness: Any, layer: Any) -> Any:
+    """The stiffness k [N/mm²] that follows the load at a penetration d >= 0 [mm] under k."""
     wanted = stiffness * pressure(d, 1.0, layer) / pressure(AIM * layer, 1.0, layer)
-    return conditional(And(ge(d, lower), le(d, upper)), stiffness, max_value(least, wanted))
+    return conditional(gt(d, NEAR_LIMIT * layer), wanted, stiffness)
 
 
 def friction_traction(

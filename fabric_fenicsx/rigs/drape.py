@@ -40,8 +40,13 @@ __all__ = ["RIG", "DrapeCase", "angles_at", "build", "run", "tools"]
 class ContactKeys(Keys):
     """Pressure and friction between tows and tools."""
 
-    stiffness_N_mm2: Positive = Field(0.5, description="force per tow length and penetration")
-    layer_mm: Positive = Field(0.5, description="penetration over which the stiffness builds up")
+    stiffness_N_mm2: Positive = Field(
+        1.0, description="force per tow length and penetration, to begin with; follows the load"
+    )
+    layer_mm: Positive = Field(
+        1.0,
+        description="penetration over which the stiffness builds up; half of it is never exceeded",
+    )
     friction: NotNegative = Field(0.0, description="Coulomb coefficient; 0 for oiled tools")
     stick_stiffness_N_mm2: Positive = Field(
         0.5, description="friction force per tow length and stretch of the stick"
@@ -88,7 +93,8 @@ class DrapeCase(Case):
     holder_gap_start_mm: float = Field(1.0, description="between holder and die at the start")
     holder_gap_mm: float = Field(
         -0.2,
-        description="between holder and die when closed; below zero the contact layers overlap",
+        description="between holder and die when closed; below zero the contact layers overlap, "
+        "at most by contact.layer_mm / 2",
     )
     holder_force_N: Positive | None = Field(
         None,
@@ -108,6 +114,10 @@ class DrapeCase(Case):
     def _fits(self) -> DrapeCase:
         if self.holder_force_N is not None and "holder_gap_mm" in self.model_fields_set:
             raise ValueError("holder_force_N, holder_gap_mm: one of the two")
+        if self.holder_force_N is None and self.holder_gap_mm < -self.contact.layer_mm / 2.0:
+            raise ValueError(
+                f"holder_gap_mm: at least -contact.layer_mm / 2 = {-self.contact.layer_mm / 2.0:g}"
+            )
         if self.symmetry == "quarter" and (self.punch_offset_x_mm or self.punch_offset_y_mm):
             raise ValueError("punch_offset_x_mm, punch_offset_y_mm: need symmetry: none")
         too_deep = self.punch_travel_mm > self.punch_radius_mm + self.edge_radius_mm

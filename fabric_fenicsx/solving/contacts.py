@@ -31,8 +31,7 @@ class ContactLaw:
     """Pressure and friction between tows and tools, see mechanics.contact.
 
     Attributes:
-        stiffness: force per tow length and penetration [N/mm²] where there is little load; it
-            follows the load.
+        stiffness: force per tow length and penetration [N/mm²] to begin with; it follows the load.
         layer: penetration over which the stiffness builds up [mm]; half of it is never exceeded.
         friction: Coulomb's μ [-]; 0 leaves friction out.
         stick_stiffness: friction force per tow length and stretch of the stick [N/mm²].
@@ -93,7 +92,7 @@ class Contacts:
         def number(value: Any) -> Any:
             return _dolfinx.constant(tows.mesh, value)
 
-        least, layer = number(law.stiffness), number(law.layer)
+        layer = number(law.layer)
         friction = (number(law.friction), number(law.stick_stiffness))
         for tool in self.tools:
             place = number(tuple(tool.path(0.0)))
@@ -122,7 +121,7 @@ class Contacts:
             self._gaps[tool.name] = _dolfinx.compile_form(form, disc.comm)
             d = max_value(-gap, 0.0)
             after = (
-                contact.followed(d, memory[0], least, layer),
+                contact.followed(d, memory[0], layer),
                 memory[0],
                 contact.penetration_energy(d, layer),
             )
@@ -176,20 +175,21 @@ class Contacts:
         }
 
     def firm_up(self) -> str:
-        """Stiffen the contact where the step that has converged sank in too deep. Collective.
+        """Stiffen the contact where tows have sunk in too deep at the increment set last.
+
+        Collective.
 
         Returns:
-            Which tools by how much, for the step has to be solved again; empty where none.
+            Into which tools and by how much, in words; empty where none did.
         """
         deepest = {name: -gap.min(initial=0.0) for name, gap in self.gaps().items()}
         deepest = {name: self._disc.comm.allreduce(d, op=MPI.MAX) for name, d in deepest.items()}
         deep = {name: d for name, d in deepest.items() if d > contact.LIMIT * self._layer}
         for name in deep:
-            stiffness = self._memories[name].x.array[0::3]
-            wanted = self._histories.next(f"{name}: stiffness")[:, 0]
-            np.maximum(stiffness, wanted, out=stiffness)
-            self._memories[name].x.scatter_forward()
-        return ", ".join(f"{name} {d:.3g} mm" for name, d in deep.items())
+            memory = self._memories[name].x
+            memory.array[0::3] = self._histories.next(f"{name}: stiffness")[:, 0]
+            memory.scatter_forward()
+        return ", ".join(f"tows sink into the {name} by {d:.3g} mm" for name, d in deep.items())
 
     def place(self, name: str) -> Array:
         """Where a tool's reference point is [mm], (3,)."""

@@ -213,6 +213,7 @@ class Model:
             self.fixed,
             force_tolerance=force_tolerance,
             limit=limit,
+            settle=self.firm_up,
             dyads=[tool.dyad for tool in pressed],
         )
 
@@ -296,11 +297,7 @@ class Model:
         self.system.gyroscopic = bool(rate.max() > NEGLIGIBLE_RATE)
 
     def firm_up(self) -> str:
-        """Stiffen the contact where the step that has converged sank in too deep. Collective.
-
-        Returns:
-            Where it did, for it has to be solved again; empty where nothing did.
-        """
+        """Stiffen the contact where tows have sunk in too deep; says where. Collective."""
         return "" if self.contacts is None else self.contacts.firm_up()
 
     def remember(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mpi4py import MPI
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 __all__ = ["State", "Step", "StepControl", "Stepper"]
 
 Array = npt.NDArray[np.float64]
-
-#: How often a step is solved again with stiffer contact before it has failed.
-FIRMER = 8
 
 
 @dataclass(slots=True)
@@ -226,16 +223,7 @@ class Stepper:
             net.tows.rate_star.x.array[:] = v_star.ravel()
             net.tows.acceleration_star.x.array[:] = a_star.ravel()
         self.newton.x.array[:] = self.predictor.guess(h)[: net.owned].ravel()
-        targets = model.targets(state.time, state.time + h)
-        outcome = self.newton.solve(targets)
-        for _ in range(FIRMER):
-            sunk = outcome.converged and model.firm_up()
-            if not sunk:
-                return outcome
-            again = self.newton.solve(targets, again=True)
-            outcome = replace(again, iterations=outcome.iterations + again.iterations)
-        reason = f"tows sink into tools whatever the contact's stiffness ({sunk})"
-        return replace(outcome, converged=False, reason=reason)
+        return self.newton.solve(model.targets(state.time, state.time + h))
 
     def advance(self, h: float) -> None:
         """Make the increment in the fields the new accepted state."""
