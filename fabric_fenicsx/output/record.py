@@ -74,7 +74,8 @@ class Record:
             (folder / "case.yaml").unlink(missing_ok=True)
             if case_text is not None:
                 write_text(folder / "case.yaml", case_text)
-        past = model.comm.bcast(self.rows[-1] if self.rows else None)
+        self.rows = model.comm.bcast(self.rows)
+        past = self.rows[-1] if self.rows else None
         self._balance = Balance(model, past, quarter=quarter)
 
     def _open(self, resume_at: float | None) -> None:
@@ -108,6 +109,8 @@ class Record:
             "failed_attempts": step.failures,
         }
         row |= self._balance.step(step.time)
+        for tool, gap in snapshot.gap.items():
+            row[f"{tool}_penetration_mm"] = max(0.0, -float(gap.min()))
         row |= measure(snapshot)
         self.rows.append(row)
         places = {tool.name: model.tool_place(tool.name) for tool in model.tools}

@@ -331,10 +331,23 @@ def run(case: DrapeCase, session: Session) -> dict[str, Any]:
 def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dict[str, Any]:
     """Tables, pictures and quantities of the last accepted step."""
     from .common import extend, lowest
+    from .health import drape_health
 
     quantities: dict[str, Any] = {}
+    summary = outcome.summary
     snapshot, net = outcome.last, model.net
     if snapshot is not None:
+        summary["health"] = drape_health(
+            net,
+            snapshot,
+            outcome.rows,
+            layer=case.contact.layer_mm,
+            rim=case.hole_radius_mm + case.edge_radius_mm,
+            quarter=case.symmetry == "quarter",
+            stiffness=model.stiffness,
+            iterations=summary["newton_iterations"],
+            wasted=summary["wasted_iterations"],
+        )
         _write_crossings(session, net, snapshot)
         row = outcome.rows[-1]
         quantities = {
@@ -349,7 +362,7 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
         }
         if session.root and session.pictures:
             _draw(case, session, model, snapshot)
-    return extend(outcome.summary, quantities, session)
+    return extend(summary, quantities, session)
 
 
 def _points(case: DrapeCase, net: Net, snapshot: Snapshot) -> list[dict[str, Any]]:

@@ -15,6 +15,7 @@ from ..output.record import Record, load_state
 from ..solving.model import Model
 from ..solving.snapshot import Snapshot
 from ..solving.stepping import Step, StepControl, Stepper
+from .health import pointless
 
 __all__ = ["Run", "simulate"]
 
@@ -103,7 +104,17 @@ def simulate(
         progress(step.time, step.number, step.iterations)
 
     stepper.observe = observe
-    stepper.keep = lambda step: record.keep(step, stepper)
+
+    def keep(step: Step) -> None:
+        record.keep(step, stepper)
+        reason = pointless(record.rows, end, [tool.name for tool in model.tools])
+        reason = model.comm.bcast(reason)
+        if reason:
+            raise SolveError(
+                f"stopped at t = {step.time:.6g} s after {step.number} accepted steps: {reason}"
+            )
+
+    stepper.keep = keep
     stop = None
     try:
         for stop_at in (*sorted(stops), end):

@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mpi4py import MPI
-
 import numpy as np
 import numpy.typing as npt
 from ufl import as_vector, max_value
@@ -168,10 +166,14 @@ class Contacts:
             tool.advance()
 
     def gaps(self) -> dict[str, Array]:
-        """Distance of this rank's own nodes from each tool [mm] at the increment set last."""
+        """Distance of each node of the net from each tool [mm] at the increment set last.
+
+        Collective; (n_nodes,) each, on every rank.
+        """
         disc = self._disc
         return {
-            name: disc.node_values(form, 1)[: disc.owned, 0] for name, form in self._gaps.items()
+            name: disc.gather_nodes(disc.node_values(form, 1)[: disc.owned])[:, 0]
+            for name, form in self._gaps.items()
         }
 
     def firm_up(self) -> str:
@@ -182,9 +184,8 @@ class Contacts:
         Returns:
             Into which tools and by how much, in words; empty where none did.
         """
-        deepest = {name: -gap.min(initial=0.0) for name, gap in self.gaps().items()}
-        deepest = {name: self._disc.comm.allreduce(d, op=MPI.MAX) for name, d in deepest.items()}
-        deep = {name: d for name, d in deepest.items() if d > contact.LIMIT * self._layer}
+        limit = contact.LIMIT * self._layer
+        deep = {name: -gap.min() for name, gap in self.gaps().items() if gap.min() < -limit}
         for name in deep:
             memory = self._memories[name].x
             memory.array[0::3] = self._histories.next(f"{name}: stiffness")[:, 0]

@@ -59,8 +59,8 @@ class Support:
 class Model:
     """The paper's model of a net, on a communicator.
 
-    ``mass`` holds (ρA, ρI about the directors) of each cell of the net, (n_cells, 4) [tonne/mm,
-    tonne mm].
+    ``stiffness`` is the diagonal of each cell's section, (n_cells, 6) [N, N mm²], ``mass`` holds
+    (ρA, ρI about the directors), (n_cells, 4) [tonne/mm, tonne mm].
 
     Args:
         net: the net, on every rank.
@@ -117,6 +117,7 @@ class Model:
         kind = (net.tow_family if tow_section is None else tow_section)[net.cell_tow]
         stiffness = diagonals(sections)[kind]
         mass = self.mass = np.array([s.mass() for s in sections])[kind]
+        self.stiffness = stiffness
         # Softest of twist and bending over the cell length squared [N].
         self._bending = stiffness[:, 3:].min(axis=1) / net.lengths**2
         self.net, self.comm = net, comm
@@ -399,6 +400,7 @@ class Model:
             axes=axes,
             shear_angle=axes_shear(axes) - self._reference_shear,
             director_turn=self.shear_angles(),
+            gap={} if self.contacts is None else self.contacts.gaps(),
             crossing_moment=np.zeros(0) if self.crossings is None else self.crossings.moments(),
         )
 
