@@ -340,6 +340,7 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
         summary["health"] = drape_health(
             net,
             snapshot,
+            outcome.gaps,
             outcome.rows,
             layer=case.contact.layer_mm,
             rim=case.hole_radius_mm + case.edge_radius_mm,

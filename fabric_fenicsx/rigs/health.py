@@ -5,7 +5,7 @@ Nothing here changes a run but `pointless`, which ends one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -20,6 +20,7 @@ from ..solving.snapshot import Snapshot
 __all__ = ["drape_health", "pointless"]
 
 Array = npt.NDArray[np.float64]
+Gaps = Mapping[str, Array]
 Rows = Sequence[dict[str, float]]
 
 TILT_RMS_DEG, TURNED_OVER_DEG = 10.0, 60.0
@@ -86,6 +87,7 @@ def pointless(rows: Rows, end: float, tools: Sequence[str]) -> str | None:
 def drape_health(
     net: Net,
     snapshot: Snapshot,
+    gaps: Gaps,
     rows: Rows,
     *,
     layer: float,
@@ -100,6 +102,7 @@ def drape_health(
     Args:
         net: the net.
         snapshot: its last step.
+        gaps: distance of its nodes from punch, die and holder [mm], negative inside, (n_nodes,).
         rows: of `steps.csv`.
         layer: of the contact, δ [mm].
         rim: radius at which the edge's rounding meets the faces of die and holder [mm].
@@ -111,8 +114,8 @@ def drape_health(
     parts = [
         _tilt(net, snapshot),
         _turn(net, snapshot),
-        _penetration(net, snapshot, rows, layer),
-        _distance(net, snapshot, layer, rim),
+        _penetration(net, gaps, rows, layer),
+        _distance(net, snapshot, gaps, layer, rim),
         _edge(net, snapshot, rim, quarter),
         _compression(net, snapshot, stiffness),
         _course(rows, iterations, wasted),
@@ -185,8 +188,8 @@ def _tilt(net: Net, snapshot: Snapshot) -> Part:
     if rms > TILT_RMS_DEG or largest > TURNED_OVER_DEG:
         said.append(
             f"tows stand on edge or have turned over: tilted out of the sheet by {rms:.1f} degrees "
-            f"rms, most at {_flat(net, int(np.nanargmax(roll)))} by {largest:.0f}; let them bend in "
-            "the sheet's plane as bundles of fibres do (tow.stiffness.bending_in_plane_Nmm), or "
+            f"rms, most at {_flat(net, int(np.nanargmax(roll)))} by {largest:.0f}; let them bend "
+            "in its plane as bundles of fibres do (tow.stiffness.bending_in_plane_Nmm), or "
             "stiffen them against twist"
         )
     return {"tilt_rms_deg": rms, "largest_tilt_deg": largest}, said
@@ -208,10 +211,10 @@ def _turn(net: Net, snapshot: Snapshot) -> Part:
     return {"directors_apart_share": share, "largest_directors_apart_deg": largest}, said
 
 
-def _penetration(net: Net, snapshot: Snapshot, rows: Rows, layer: float) -> Part:
+def _penetration(net: Net, gaps: Gaps, rows: Rows, layer: float) -> Part:
     figures: dict[str, Any] = {}
     said = []
-    for tool, gap in snapshot.gap.items():
+    for tool, gap in gaps.items():
         past = [row[f"{tool}_penetration_mm"] for row in rows]
         worst = int(np.argmax(past))
         place = net.points[int(gap.argmin())]
@@ -231,11 +234,11 @@ def _penetration(net: Net, snapshot: Snapshot, rows: Rows, layer: float) -> Part
     return {"penetration": figures}, said
 
 
-def _distance(net: Net, snapshot: Snapshot, layer: float, rim: float) -> Part:
+def _distance(net: Net, snapshot: Snapshot, gaps: Gaps, layer: float, rim: float) -> Part:
     """Bridging under the punch, within what touches it, and the sheet above the die's face."""
     place = (net.points + snapshot.displacement)[:, :2]
     figures, said = {}, []
-    punch, die = snapshot.gap["punch"], snapshot.gap["die"]
+    punch, die = gaps["punch"], gaps["die"]
     under = _within(place, place[punch < 0.0])
     flange = np.hypot(*place.T) > rim
     for key, gap, own, what, cure in (

@@ -8,6 +8,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from .. import _dolfinx
 from ..errors import InputError, SolveError
 from ..output.folder import prepare_folder
@@ -31,6 +34,7 @@ class Run:
         stop: why it stopped, if it did not.
         rows: what was recorded at each accepted step.
         last: the last accepted step, if there was one.
+        gaps: distance of its nodes from each tool [mm], (n_nodes,).
         summary: the fixed part of result.json.
     """
 
@@ -38,6 +42,7 @@ class Run:
     stop: str | None
     rows: list[dict[str, float]]
     last: Snapshot | None
+    gaps: dict[str, npt.NDArray[np.float64]]
     summary: dict[str, Any]
 
 
@@ -142,4 +147,4 @@ def simulate(
         "dofs": int(model.net.points.shape[0] * 6),
         "seconds": {key: round(value, 3) for key, value in seconds.items()},
     }
-    return Run(stop is None, stop, record.rows, last[0] if last else None, summary)
+    return Run(stop is None, stop, record.rows, last[0] if last else None, record.gaps, summary)

@@ -333,6 +333,10 @@ class Model:
             raise KeyError(name)
         return self.contacts.place(name)
 
+    def gaps(self) -> dict[str, Array]:
+        """Distance of each node from each tool [mm], negative inside, (n_nodes,), on every rank."""
+        return {} if self.contacts is None else self.contacts.gaps()
+
     def weight_work(self) -> float:
         """Work of gravity over the step whose increment stands in the fields [N mm]."""
         if not np.any(self._full_gravity):
@@ -400,7 +404,6 @@ class Model:
             axes=axes,
             shear_angle=axes_shear(axes) - self._reference_shear,
             director_turn=self.shear_angles(),
-            gap={} if self.contacts is None else self.contacts.gaps(),
             crossing_moment=np.zeros(0) if self.crossings is None else self.crossings.moments(),
         )
 

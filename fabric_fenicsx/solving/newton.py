@@ -291,7 +291,8 @@ class Newton:
         self._step = norms[1] if iteration else float("inf")
         if not np.isfinite(residual):
             return NOT_A_NUMBER
-        if iteration > 0 and residual < self.force_tolerance:
+        settled = not self._unsettled
+        if iteration > 0 and residual < self.force_tolerance and settled:
             return int(reasons.CONVERGED_FNORM_ABS)
         history = self._history
         since = len(history) - 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -34,7 +34,6 @@ class Snapshot:
         director_turn: the same of the directors of a crossing's nodes [rad], which its springs
             feel, shape (n_crossings,).
         crossing_moment: moment between the tows of each crossing [N mm], shape (n_crossings,).
-        gap: distance of each node from each tool [mm], negative inside, shape (n_nodes,).
 
     Raises:
         ValueError: the arrays contradict each other.
@@ -50,7 +49,6 @@ class Snapshot:
     shear_angle: npt.NDArray[np.float64]
     director_turn: npt.NDArray[np.float64]
     crossing_moment: npt.NDArray[np.float64]
-    gap: dict[str, npt.NDArray[np.float64]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.time):
