@@ -160,7 +160,7 @@ def pressed_net(tool, comm=MPI.COMM_SELF, friction=0.2):
         SECTION,
         crossovers=CROSSOVERS,
         tools=[tool],
-        contact_law=ContactLaw(2.0, 0.5, friction, 0.5),
+        contact_law=ContactLaw(4.0, 1.0, friction, 0.5),
         supports=supports,
         comm=comm,
     )

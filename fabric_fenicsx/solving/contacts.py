@@ -190,6 +190,8 @@ class Contacts:
             memory = self._memories[name].x
             memory.array[0::3] = self._histories.next(f"{name}: stiffness")[:, 0]
             memory.scatter_forward()
+        if deep:
+            self.refresh()
         return ", ".join(f"tows sink into the {name} by {d:.3g} mm" for name, d in deep.items())
 
     def place(self, name: str) -> Array:
