@@ -246,7 +246,8 @@ def bundle_table(
     """The net without parameters, solid strips and bundles beside each other, at their turn too.
 
     Args:
-        strips, bundles: drapes of Table 3 by spacing, without friction.
+        strips: drapes of Table 3 by spacing, without friction.
+        bundles: the same with another bending in the plane.
         finer: drapes of `drape.yaml` by the name of their spacing.
     """
     lines = [
@@ -419,18 +420,23 @@ The five points are marked in red, where they end. What to make of it:
 
 ## What the five angles test
 
-The strips of Table 3 are solid: bending them in the sheet's plane takes 13,000 times the moment of bending them out of it. Between crossings they
-tilt onto their edges and buckle sideways, and the angles above are those of buckled strips ([theory](theory.md#what-bends-in-the-plane-of-the-sheet)).
-Below, the same fabrics bend in the plane with 9.5 N mm per mm of width, as bundles of sliding fibres may (`drape.yaml`); and
-a [kinematic net](kinematic.md) of tows that neither stretch nor slip is laid over the tools. It knows neither section, springs, dashpots nor friction.
+The strips of Table 3 are solid: bending them in the sheet's plane takes 13,000 times the moment
+of bending them out of it. Between crossings they tilt onto their edges and buckle sideways, and
+the angles above are those of buckled strips
+([theory](theory.md#what-bends-in-the-plane-of-the-sheet)). Below, the same fabrics bend in the
+plane with 9.5 N mm per mm of width, as bundles of sliding fibres may (`drape.yaml`); and a
+[kinematic net](kinematic.md) of tows that neither stretch nor slip is laid over the tools. It
+knows neither section, springs, dashpots nor friction.
 
 {bundles}
 
-- The net without a parameter comes as near to the measurement as any of the models. So the five angles test the geometry of the tools and where the five
-  points lie. They do not test the fabric's law: no spring, dashpot or friction can raise points 2 and 4 to 71 degrees while tows keep their length and
-  stay pinned.
-- Bundles converge: from 6 to 3 mm the five angles move by at most {moved:.1f} degrees. Solid strips do not, and their directors, which the paper's
-  springs feel, turn otherwise than the tows' axes.
+- The net without a parameter comes as near to the measurement as any of the models. So the five
+  angles test the geometry of the tools and where the five points lie. They do not test the
+  fabric's law: no spring, dashpot or friction can raise points 2 and 4 to 71 degrees while tows
+  keep their length and stay pinned.
+- Bundles converge: from 6 to 3 mm the five angles move by at most {moved:.1f} degrees. Solid
+  strips do not, and their directors, which the paper's springs feel, turn otherwise than the
+  tows' axes.
 
 ## Waves, and a holder that stretches the tows
 
