@@ -322,21 +322,28 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             "largest_shear_angle_deg": row["largest_shear_deg"],
             "lowest_point_mm": lowest(net, snapshot.displacement),
             "kinetic_over_stored_energy": _kinetic_share(outcome.rows),
-            "points": _points(case, net, snapshot),
+            "points": _points(case, session, net, outcome),
         }
         if session.root and session.pictures:
             _draw(case, session, model, snapshot)
     return extend(outcome.summary, quantities, session)
 
 
-def _points(case: DrapeCase, net: Net, snapshot: Snapshot) -> list[dict[str, Any]]:
+def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[dict[str, Any]]:
+    from .kinematic import known_angles
+
+    assert outcome.last is not None
     places = np.array([[p.x_mm, p.y_mm] for p in case.points]).reshape(-1, 2)
     if case.symmetry == "quarter":
         places = np.abs(places)
-    angles = angles_at(net, snapshot.shear_angle, places) if len(places) else np.zeros(0)
+    angles = angles_at(net, outcome.last.shear_angle, places) if len(places) else np.zeros(0)
+    completed = outcome.summary["completed"]
+    known = known_angles(case, session.base) if completed else [None] * len(places)
     return [
-        {**point.model_dump(exclude_none=True), "angle_deg": round(float(angle), 3)}
-        for point, angle in zip(case.points, angles, strict=True)
+        point.model_dump(exclude_none=True)
+        | {"angle_deg": round(float(angle), 3)}
+        | ({} if kinematic is None else {"kinematic_deg": kinematic})
+        for point, angle, kinematic in zip(case.points, angles, known, strict=True)
     ]
 
 

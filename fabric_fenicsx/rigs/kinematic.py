@@ -20,7 +20,7 @@ from ..geometry.triangles import read_stl
 from .cases import Case
 from .drape import DrapeCase, flat_sheet
 
-__all__ = ["SPACING", "acute_angles", "formed_surface", "kinematic_net", "quantities"]
+__all__ = ["SPACING", "formed_surface", "kinematic_net", "known_angles", "quantities"]
 
 Array = npt.NDArray[np.float64]
 
@@ -110,20 +110,25 @@ def _sheet(case: DrapeCase, base: Path) -> tuple[Outline, Array]:
     return sheet.outline, np.array([sheet.directions[WEFT], sheet.directions[WARP]])
 
 
-def acute_angles(net: KinematicNet, places: Array) -> Array:
-    """Acute angle between the tows [degrees] at places on the flat sheet [mm], (n, 2).
+def point_angles(case: DrapeCase, net: KinematicNet) -> list[float | None]:
+    """Acute angle between the tows [degrees] at each of the case's points, None without a net."""
+    places = np.array([[point.x_mm, point.y_mm] for point in case.points]).reshape(-1, 2)
+    angles = net.at(90.0 - np.abs(90.0 - np.degrees(net.angle)), places)
+    return [None if np.isnan(angle) else round(float(angle), 3) for angle in angles]
 
-    NaN where there is no net.
-    """
-    return net.at(90.0 - np.abs(90.0 - np.degrees(net.angle)), places)
+
+def known_angles(case: DrapeCase, base: Path) -> list[float | None]:
+    """The same, None for all points of a case that has no such net."""
+    try:
+        return point_angles(case, kinematic_net(case, base)) if case.points else []
+    except InputError:
+        return [None] * len(case.points)
 
 
 def quantities(case: DrapeCase, net: KinematicNet) -> dict[str, Any]:
     """What a kinematic net says in numbers, named as those of result.json."""
     shear = np.degrees(np.where(net.sheet, np.abs(net.shear), np.nan))
     largest = np.unravel_index(np.nanargmax(shear), shear.shape)
-    places = np.array([[point.x_mm, point.y_mm] for point in case.points]).reshape(-1, 2)
-    angles = acute_angles(net, places)
     return {
         "largest_shear_angle_deg": float(shear[largest]),
         "largest_shear_x_mm": float(net.flat[largest][0]),
@@ -133,10 +138,10 @@ def quantities(case: DrapeCase, net: KinematicNet) -> dict[str, Any]:
         "points": [
             {
                 **point.model_dump(include={"x_mm", "y_mm"}),
-                "kinematic_deg": None if np.isnan(angle) else round(float(angle), 3),
+                "kinematic_deg": angle,
                 **point.model_dump(include={"measured_deg", "std_deg"}, exclude_none=True),
             }
-            for point, angle in zip(case.points, angles, strict=True)
+            for point, angle in zip(case.points, point_angles(case, net), strict=True)
         ],
     }
 
