@@ -8,7 +8,7 @@ axis and touch both, follows the edge and lies flat on the die's face, z = 0. Wh
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -92,18 +92,23 @@ class FormedHemisphere:
         above_edge = z + self.edge_radius
         sin, cos = np.sin(self.slope), np.cos(self.slope)
         along = r * cos + height * sin
-        sphere, edge = np.hypot(r, height), np.hypot(r - rim, above_edge)
-        pieces = [along < 0.0, along <= self.span, r < rim]
-        value = np.select(
-            pieces,
-            [sphere - self.punch_radius, r * sin - height * cos - self.punch_radius,
-             self.edge_radius - edge],
+        from_centre, from_edge = np.hypot(r, height), np.hypot(r - rim, above_edge)
+        on_sphere, on_cone, on_edge = along < 0.0, along <= self.span, r < rim
+
+        def piecewise(sphere: Array, cone: Any, edge: Array, flange: Any) -> Array:
+            beyond = np.where(on_cone, cone, np.where(on_edge, edge, flange))
+            return np.where(on_sphere, sphere, beyond)
+
+        value = piecewise(
+            from_centre - self.punch_radius,
+            r * sin - height * cos - self.punch_radius,
+            self.edge_radius - from_edge,
             -z,
-        )  # fmt: skip
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
             # Per radius, so that the axis needs no direction.
-            outward = np.select(pieces, [1.0 / sphere, sin / r, (rim - r) / (edge * r)], 0.0)
-            upward = np.select(pieces, [height / sphere, -cos, -above_edge / edge], -1.0)
+            outward = piecewise(1.0 / from_centre, sin / r, (rim - r) / (from_edge * r), 0.0)
+            upward = piecewise(height / from_centre, -cos, -above_edge / from_edge, -1.0)
         return value, np.column_stack([outward * x[:, 0], outward * x[:, 1], upward])
 
 

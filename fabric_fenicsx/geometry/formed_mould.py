@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import RectBivariateSpline
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import map_coordinates, spline_filter
 
+from .distance import cubic_basis
 from .triangles import Triangles
 
 __all__ = ["FormedMould", "round_die"]
@@ -33,13 +33,13 @@ class FormedMould:
 
     Attributes:
         eye: its height H over the die's face [mm].
-        reach: how far out in X and Y the spline goes; beyond, the sheet lies flat.
-        spline: q H² [mm] over X and Y.
+        reach: how far out in X and Y the raster goes; at its rim and beyond, the sheet lies flat.
+        coefficients: of the cubic B-spline of q H² at the raster's points [mm], (n, n).
     """
 
     eye: float
     reach: float
-    spline: Any
+    coefficients: Array
 
     @classmethod
     def of(cls, punch: Triangles, die: Triangles, depth: float) -> FormedMould:
@@ -75,26 +75,38 @@ class FormedMould:
             raise ValueError(f"punch and die meet at a depth of {depth:g} mm")
         axis = np.linspace(-reach, reach, 2 * LINES + 1)
         q = _spanned(upper, lower, axis, 1.0 / eye)
-        return cls(eye, reach, RectBivariateSpline(axis, axis, q * eye**2))
+        return cls(eye, reach, spline_filter(q * eye**2, order=3))
 
     @property
     def apex(self) -> Array:
         """The surface's point on the axis [mm]."""
-        return np.array([0.0, 0.0, self.eye - self.eye**2 / float(self.spline(0.0, 0.0)[0, 0])])
+        return np.array(
+            [0.0, 0.0, self.eye - self.eye**2 / float(self._seen(np.zeros((1, 2)))[0][0])]
+        )
 
     def level(self, x: Array) -> tuple[Array, Array]:
         """H² (1/(H − z) − q(X, Y)) and its gradient, with the sign that is positive below."""
         with np.errstate(divide="ignore"):
             q = 1.0 / (self.eye - x[:, 2])
-        X, Y = (x[:, :2] * q[:, None]).T
-        inside = (np.abs(X) < self.reach) & (np.abs(Y) < self.reach)
-        value, along_x, along_y = np.full(len(x), self.eye), np.zeros(len(x)), np.zeros(len(x))
-        value[inside] = self.spline.ev(X[inside], Y[inside])
-        along_x[inside] = self.spline.ev(X[inside], Y[inside], dx=1)
-        along_y[inside] = self.spline.ev(X[inside], Y[inside], dy=1)
-        upward = q * (along_x * X + along_y * Y) - (self.eye * q) ** 2
-        gradient = np.column_stack([along_x * q, along_y * q, upward])
-        return value - self.eye**2 * q, gradient
+        at = x[:, :2] * q[:, None]
+        value, slope = self._seen(at)
+        upward = q * np.einsum("ni,ni->n", slope, at) - (self.eye * q) ** 2
+        return value - self.eye**2 * q, np.column_stack([slope * q[:, None], upward])
+
+    def _seen(self, at: Array) -> tuple[Array, Array]:
+        """The spline (n,) and its gradient (n, 2) at X and Y, (n, 2)."""
+        value, slope = np.full(len(at), self.eye), np.zeros((len(at), 2))
+        step = self.reach / LINES
+        inside = (np.abs(at) < self.reach - 2.0 * step).all(axis=1)
+        s = (at[inside] + self.reach) / step
+        first = np.floor(s).astype(np.int64)
+        index = first[:, :, None] + np.arange(-1, 3)
+        c = self.coefficients[index[:, 0, :, None], index[:, 1, None, :]]
+        f, df, _ = cubic_basis(s - first)
+        value[inside] = np.einsum("nij,ni,nj->n", c, f[:, 0], f[:, 1])
+        slope[inside, 0] = np.einsum("nij,ni,nj->n", c, df[:, 0], f[:, 1]) / step
+        slope[inside, 1] = np.einsum("nij,ni,nj->n", c, f[:, 0], df[:, 1]) / step
+        return value, slope
 
 
 def round_die(hole_radius: float, edge_radius: float) -> Triangles:

@@ -162,7 +162,7 @@ def _principal(surface: FormedSurface, stations: Array, direction: Array) -> Arr
         along = side * start / np.linalg.norm(start)
         for k in range(middle + side, end, side):
             before, length = place[k - side], abs(stations[k] - stations[k - side])
-            across = np.cross(surface.level(before[None])[1][0], along)[None]
+            across = _cross(surface.level(before[None])[1][0], along)[None]
             across /= np.linalg.norm(across)
 
             def straight(
@@ -205,7 +205,7 @@ def _fill(
         )
         # Sine of the angle between weft and warp, seen from above.
         up = -surface.level(x)[1]
-        sine = si * sj * _dot(np.cross(x - a, x - b), up)
+        sine = si * sj * _dot(_cross(x - a, x - b), up)
         sine /= np.linalg.norm(up, axis=1) * along_weft * along_warp
         place[at, to] = np.where((sine > np.sin(CLOSED))[:, None], x, np.nan)
 
@@ -220,6 +220,12 @@ def _unit(vectors: Array) -> Array:
 
 def _dot(a: Array, b: Array) -> Array:
     return np.asarray(np.einsum("...i,...i->...", a, b), dtype=np.float64)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """np.cross takes its time to find out what it is given."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 Equation = Callable[[Array], tuple[Array, Array]]
@@ -241,7 +247,7 @@ def _newton(
     """Places on the surface (n, 3) where two more equations hold; NaN where none is found."""
     for _ in range(ITERATIONS):
         (f, df), (g, dg), (h, dh) = surface.level(x), one(x), other(x)
-        first, second, third = np.cross(dg, dh), np.cross(dh, df), np.cross(df, dg)
+        first, second, third = _cross(dg, dh), _cross(dh, df), _cross(df, dg)
         with np.errstate(divide="ignore", invalid="ignore"):
             change = f[:, None] * first + g[:, None] * second + h[:, None] * third
             change = change / _dot(df, first)[:, None]
