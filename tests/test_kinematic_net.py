@@ -340,7 +340,8 @@ def test_the_command_says_where_the_net_ends(tmp_path, capsys):
 WRONG = {
     "no drape": ([ROOT / "demos" / "picture_frame.yaml"], "test: picture_frame"),
     "a mesh": ([DEMO, "--set", "mesh=a.msh"], "mesh: a kinematic net takes"),
-    "spacing": ([DEMO, "--spacing", "0"], "allowed is above 0"),
+    "spacing": ([DEMO, "--spacing", "0"], "spacing: 0 mm, allowed is above 0"),
+    "too coarse": ([DEMO, "--spacing", "21"], "at most a quarter of the hole's radius, 20"),
     "too fine": ([DEMO, "--spacing", "0.01"], "crossings, allowed are"),
     "punch and hole": ([DEMO, "--set", "punch_radius_mm=90"], "punch_radius_mm: "),
     "no file": ([DEMO, "--set", "punch_stl=none.stl"], "none.stl"),
@@ -377,9 +378,13 @@ def test_nets_and_surfaces_that_cannot_be():
         ff.FormedHemisphere(RADIUS, 80.0, 10.0, 90.0)
     die = ff.round_die(80.0, 10.0)
     beside = ff.Triangles(bullet(20.0).points + np.array([300.0, 0.0, 0.0]), bullet(20.0).cells)
+    raised = ff.Triangles(die.points + np.array([0.0, 0.0, 3.0]), die.cells)
+    half = ff.Triangles(die.points, die.cells[(die.points[die.cells, 0] > 0.0).all(axis=1)])
     for punch, plate, depth, words in (
         (bullet(20.0), die, 0.0, "above 0"),
         (beside, die, 20.0, "misses the punch"),
+        (bullet(20.0), raised, 20.0, "z = 3 mm"),
+        (bullet(20.0), half, 20.0, "does not surround"),
         (bullet(20.0), lathe([[90.0, 0.0], [120.0, 0.0]]), 20.0, "no rounded edge"),
     ):
         with pytest.raises(ValueError, match=words):

@@ -24,8 +24,13 @@ def kinematic(
         typer.Option("--set", metavar="KEY=VALUE", help="Put a value over the file's."),
     ] = None,
     spacing: Annotated[
-        float, typer.Option("--spacing", metavar="MM", help="Of the net's tows at most.")
-    ] = 2.0,
+        float | None,
+        typer.Option(
+            "--spacing",
+            metavar="MM",
+            help="Of the net's tows at most; default: a fortieth of the hole's radius.",
+        ),
+    ] = None,
 ) -> None:
     """Lay tows that keep their length over the tools, without mechanics.
 

@@ -53,8 +53,9 @@ class FormedMould:
             depth: of the draw [mm], positive.
 
         Raises:
-            ValueError: the depth is not positive, the axis misses the punch or meets the die, or
-                punch and die meet.
+            ValueError: the depth is not positive, the die's face lies elsewhere or its edge is not
+                round, it does not surround the axis, the axis misses the punch, or punch and die
+                meet.
         """
         if not depth > 0.0:
             raise ValueError(f"depth {depth:g} mm: allowed is above 0")
@@ -63,6 +64,8 @@ class FormedMould:
         edge = (normals[:, 2] > 1e-6 * sizes) & (normals[:, 2] < (1.0 - 1e-6) * sizes)
         if not edge.any():
             raise ValueError("the die has no rounded edge")
+        if abs(die.points[:, 2].max()) > 1e-3:
+            raise ValueError(f"the die's face lies at z = {die.points[:, 2].max():g} mm, not at 0")
         rim = float(np.abs(die.points[die.cells[edge]][..., :2]).max())
         eye = max(depth, rim / 2.0)
         reach = 1.05 * rim / eye
@@ -201,6 +204,8 @@ def _spanned(upper: Array, lower: Array, axis: Array, flat: float) -> Array:
         i = _steepest(die[rows, j, None] - punch, rho[j, None] - rho)
         if np.array_equal(before, (i, j)):
             break
+    if (j == 0).any():
+        raise ValueError("the die does not surround the axis x = y = 0")
     slope = (die[rows, j] - punch[rows, i]) / (rho[j] - rho[i])
     start = die[rows, j] - slope * rho[j]
 

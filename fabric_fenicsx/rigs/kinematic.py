@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -20,12 +21,13 @@ from ..geometry.triangles import read_stl
 from .cases import Case
 from .drape import DrapeCase, flat_sheet
 
-__all__ = ["SPACING", "formed_surface", "kinematic_net", "known_angles", "quantities"]
+__all__ = ["formed_surface", "kinematic_net", "known_angles", "quantities"]
 
 Array = npt.NDArray[np.float64]
 
-SPACING = 2.0
-"""Of the net [mm]: its angles on the hemisphere of `demos/drape.yaml` are within 0.3 degrees."""
+FINE, COARSE = 1.0 / 40.0, 1.0 / 4.0
+"""Spacing of a net unless told, and the widest allowed, as shares of the hole's radius: 2 mm on the
+hemisphere of `demos/drape.yaml`, where angles are then within 0.3 degrees, and 20 mm."""
 
 MOST = 2_000_000
 """Crossings of a net; some 10 µs and 200 bytes for each."""
@@ -52,7 +54,7 @@ def formed_surface(case: DrapeCase, base: Path = Path()) -> FormedSurface:
     return Moved(surface, axis) if any(axis) else surface
 
 
-def kinematic_net(case: Case, base: Path = Path(), *, spacing: float = SPACING) -> KinematicNet:
+def kinematic_net(case: Case, base: Path = Path(), *, spacing: float | None = None) -> KinematicNet:
     """The net that a drape case's sheet makes at the end of the draw, always of the whole sheet.
 
     Its principal tows cross on the punch's axis and run in the directions of the case's warp and
@@ -61,8 +63,8 @@ def kinematic_net(case: Case, base: Path = Path(), *, spacing: float = SPACING) 
     Args:
         case: of the rig "drape".
         base: folder that files in the case count from.
-        spacing: of the net's tows at most [mm]; pieces of a tow between its apex and its end are
-            of one length.
+        spacing: of the net's tows at most [mm], by default a fortieth of the hole's radius; pieces
+            of a tow between its apex and its end are of one length.
 
     Raises:
         InputError: the case is no drape, has a mesh of its own, or there is no such surface or net.
@@ -71,8 +73,13 @@ def kinematic_net(case: Case, base: Path = Path(), *, spacing: float = SPACING) 
         raise InputError(f"test: {case.test}, a kinematic net needs drape")
     if case.mesh is not None:
         raise InputError("mesh: a kinematic net takes its sheet from sheet and weave")
-    if not spacing > 0.0:
-        raise InputError(f"spacing: {spacing:g} mm, allowed is above 0")
+    widest = COARSE * case.hole_radius_mm
+    spacing = FINE * case.hole_radius_mm if spacing is None else spacing
+    if not 0.0 < spacing <= widest:
+        raise InputError(
+            f"spacing: {spacing:g} mm, allowed is above 0 and at most a quarter of the hole's "
+            f"radius, {widest:g}"
+        )
     outline, axes = _sheet(case, base)
     apex = np.array([case.punch_offset_x_mm, case.punch_offset_y_mm])
     # Coordinates along weft and warp are components along the axes' dual vectors.
@@ -94,11 +101,11 @@ def kinematic_net(case: Case, base: Path = Path(), *, spacing: float = SPACING) 
     weft_angle, warp_angle = np.degrees(np.arctan2(axes[:, 1], axes[:, 0]))
     surface = formed_surface(case, base)
     net = net_on_surface(surface, u, v, warp_angle=warp_angle, weft_angle=weft_angle)
-    for row, along in enumerate(u):
-        chords = outline.chords(apex + along * axes[0], axes[1])
-        inside = [(v >= low - 1e-6) & (v <= high + 1e-6) for low, high in chords]
-        net.sheet[row] = np.any(inside, axis=0) if inside else False
-    return net
+    inside = np.zeros_like(net.sheet)
+    for row, along in zip(inside, u, strict=True):
+        for low, high in outline.chords(apex + along * axes[0], axes[1]):
+            row |= (v >= low - 1e-6) & (v <= high + 1e-6)
+    return replace(net, sheet=inside)
 
 
 def _sheet(case: DrapeCase, base: Path) -> tuple[Outline, Array]:
