@@ -29,8 +29,9 @@ Array = npt.NDArray[np.float64]
 #: Smallest angle between the tows of a mesh [rad]; below it they lie side by side.
 CLOSED = np.radians(1.0)
 
-#: Newton iterations for a crossing, and the length at which they end as a share of the spacing.
-ITERATIONS, SMALL = 20, 1e-12
+#: Newton iterations for a crossing, and the length of the last as a share of the spacing: what is
+#: left after it is the square of that.
+ITERATIONS, SMALL = 20, 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,35 +151,19 @@ def net_on_surface(
 
 def _principal(surface: FormedSurface, stations: Array, direction: Array) -> Array:
     """A tow through the apex: each piece in the plane of the one before it and the normal."""
-    apex = surface.apex
     place = np.full((len(stations), 3), np.nan)
     middle = _zero(stations)
-    place[middle] = apex
-    normal = surface.level(apex[None])[1][0]
-    start = np.append(direction, 0.0)
-    start = start - (start @ normal) / (normal @ normal) * normal
+    place[middle] = surface.apex
     for side in (1, -1):
-        end = len(stations) if side > 0 else -1
-        along = side * start / np.linalg.norm(start)
-        for k in range(middle + side, end, side):
-            before, length = place[k - side], abs(stations[k] - stations[k - side])
-            across = _cross(surface.level(before[None])[1][0], along)[None]
-            across /= np.linalg.norm(across)
-
-            def straight(
-                x: Array, before: Array = before, across: Array = across, length: float = length
-            ) -> tuple[Array, Array]:
-                return _dot(x - before, across) * length, across * length
-
-            found = _newton(
-                surface,
-                (before + length * along)[None],
-                _spaced(before[None], np.array([length])),
-                straight,
-                np.array([length]),
-            )[0]
-            place[k] = found
-            along = (found - before) / length
+        along = np.append(side * direction, 0.0)
+        for k in range(middle + side, len(stations) if side > 0 else -1, side):
+            before, length = place[[k - side]], np.abs(stations[[k]] - stations[k - side])
+            normal = _unit(surface.level(before)[1])
+            across = _unit(_cross(normal, along[None]))
+            start = before + length * _cross(across, normal)
+            straight = _in_plane(before, across * length)
+            place[[k]] = _newton(surface, start, _spaced(before, length), straight, length)
+            along = place[k] - before[0]
     return place
 
 
@@ -237,6 +222,15 @@ def _spaced(origin: Array, length: Array) -> Equation:
     def equation(x: Array) -> tuple[Array, Array]:
         arm = x - origin
         return (_dot(arm, arm) - length**2) / 2.0, arm
+
+    return equation
+
+
+def _in_plane(origin: Array, normal: Array) -> Equation:
+    """(x − origin)·normal and its gradient."""
+
+    def equation(x: Array) -> tuple[Array, Array]:
+        return _dot(x - origin, normal), normal
 
     return equation
 
