@@ -7,9 +7,7 @@ tows along p′ and q′ keep their length, and sin γ = p′ · q′.
 from __future__ import annotations
 
 import base64
-import shutil
 import struct
-import subprocess
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -23,23 +21,18 @@ from solve import orders
 from test_output import NET, square
 from test_views import command, sheared, write_step
 
+from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.inputs.deck import read_deck
 from fabric_fenicsx.inputs.shell_mesh import ShellMesh, padded
 from fabric_fenicsx.output.fibres import FibreMap, fibre_map
 from fabric_fenicsx.output.results import write_setup
 from fabric_fenicsx.output.shells import Placement, on_shells, warp_share
-from fabric_fenicsx.solving.snapshot import at_rest
+from fabric_fenicsx.solving.snapshot import Snapshot, at_rest
 
-ROOT = Path(__file__).parents[1]
 GAMMA = np.radians(40.0)
+
 RADIUS = 70.0
 
-E1, E2, NU12, NU23, G12, G23 = 120e3, 8e3, 0.3, 0.4, 4e3, 3e3
-MATERIAL = f"""*MATERIAL, NAME=UD
-*ELASTIC, TYPE=ENGINEERING CONSTANTS
-{E1}, {E2}, {E2}, {NU12}, {NU12}, {NU23}, {G12}, {G12},
-{G23}
-"""
 KINDS = {"S3": 3, "S4": 4, "S6": 6, "S8R": 8}
 
 
@@ -95,6 +88,11 @@ def translation_surface(u, v):
 
 
 def curved(spacing: float) -> FibreMap:
+    """The fibres of the net on the surface."""
+    return fibre_map(*on_surface(spacing))
+
+
+def on_surface(spacing: float) -> tuple[Net, Snapshot]:
     """The net on the surface."""
     net = square(-60.0, 60.0, spacing)
     place, warp, weft = translation_surface(*net.points.T[:2])
@@ -103,12 +101,9 @@ def curved(spacing: float) -> FibreMap:
     along = np.where((net.node_family == net.node_family[0])[:, None], warp, weft)
     directors = np.stack([along, np.cross(up, along), up], axis=1)
     shear = np.arcsin(np.einsum("ij,ij->i", warp, weft))[net.crossings[:, 0]]
-    return fibre_map(
-        net,
-        replace(
-            at_rest(net), displacement=place - net.points, directors=directors, shear_angle=shear
-        ),
-    )
+    rest = at_rest(net)
+    bent = replace(rest, displacement=place - net.points, directors=directors, shear_angle=shear)
+    return net, bent
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -234,130 +229,17 @@ def test_what_the_fabric_does_not_cover_gets_no_direction():
     assert not back.any()
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """The folder of a run that ended in uniform shear."""
-    path = tmp_path_factory.mktemp("run")
-    write_setup(path, NET)
-    write_step(path, 1, sheared(GAMMA)[0], {})
+def run_folder(path: Path, net: Net, snapshot: Snapshot) -> Path:
+    """The folder of a run that ended so."""
+    path.mkdir(exist_ok=True)
+    write_setup(path, net)
+    write_step(path, 1, snapshot, {})
     return path
 
 
 @pytest.fixture(scope="module")
 def unsheared(tmp_path_factory):
-    path = tmp_path_factory.mktemp("run at rest")
-    write_setup(path, NET)
-    write_step(path, 1, at_rest(NET), {})
-    return path
-
-
-LENGTH, WIDTH, FORCE = 40.0, 10.0, 100.0
-
-
-def pulled_strip(kind: str, *, flat: bool) -> str:
-    """A deck of a strip along x under a uniform stress, with a section that says nothing of fibres.
-
-    It is free to contract and to shear; where `flat`, it may not bend or twist.
-    """
-    points, elements = strip(kind, LENGTH, WIDTH, 8, 2)
-    lines = ["*HEADING", "a strip", "*NODE, NSET=ALL"]
-    lines += [f"{k}, {x}, {y}, 0." for k, (x, y) in enumerate(points.tolist(), start=1)]
-    lines += [f"*ELEMENT, TYPE={kind}, ELSET=STRIP"]
-    lines += [", ".join(map(str, [k, *row])) for k, row in enumerate(elements.tolist(), start=1)]
-    lines += [*MATERIAL.splitlines(), "*SHELL SECTION, ELSET=STRIP, MATERIAL=UD", "9.", "*STEP"]
-    lines += ["*STATIC", "*BOUNDARY"]
-    left, right = (np.flatnonzero(points[:, 0] == x) + 1 for x in (0.0, LENGTH))
-    # A stress that is uniform needs no more than a rigid support.
-    lines += [f"{left[0]}, 1, 2", f"{right[0]}, 2, 2"]
-    lines += ["ALL, 3, 6"] if flat else ["ALL, 3, 3"]
-    weights = np.array([1, 1]) / 2 if KINDS[kind] < 5 else np.array([1, 4, 1]) / 6
-    loads = np.zeros(len(left))
-    for start in range(0, len(left) - 1, len(weights) - 1):
-        loads[start : start + len(weights)] += weights / 2
-    lines.append("*CLOAD")
-    for ends, sign in ((left, -1.0), (right, 1.0)):
-        lines += [f"{k}, 1, {sign * FORCE * w}" for k, w in zip(ends, loads, strict=True)]
-    return "\n".join([*lines, "*NODE PRINT, NSET=ALL", "U", "*END STEP"]) + "\n"
-
-
-def strains(folder: Path, name: str) -> np.ndarray:
-    """ε_x, ε_y and γ_xy that CalculiX finds in a deck."""
-    ccx = shutil.which("ccx")
-    if ccx is None:
-        if (ROOT / ".venv" / "setup-stamp").exists():
-            pytest.fail("there is no ccx: make setup installs calculix-ccx")
-        pytest.skip("there is no ccx")
-    done = subprocess.run([ccx, name], cwd=folder, capture_output=True, text=True, timeout=100)
-    assert "Job finished" in done.stdout and "*ERROR" not in done.stdout, done.stdout[-3000:]
-    assert "WARNING" not in done.stdout, done.stdout
-    text = (folder / f"{name}.dat").read_text().splitlines()
-    u = {int(w[0]): np.array(w[1:], float) for w in map(str.split, text) if len(w) == 4}
-    points = read_deck(folder / f"{name}.inp").points
-    at = {tuple(p[:2]): u[k] for k, p in enumerate(points.tolist(), start=1)}
-    a, b, c = (at[corner] for corner in ((0.0, 0.0), (LENGTH, 0.0), (0.0, WIDTH)))
-    along, across = (b - a) / LENGTH, (c - a) / WIDTH
-    return np.array([along[0], across[1], along[1] + across[0]])
-
-
-def stiffness(angle: float) -> np.ndarray:
-    """Q̄ of a ply whose fibres are turned by an angle from x, classical laminate theory."""
-    compliance = np.array([[1 / E1, -NU12 / E1, 0.0], [-NU12 / E1, 1 / E2, 0.0], [0, 0, 1 / G12]])
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[c * c, s * s, 2 * c * s], [s * s, c * c, -2 * c * s]])
-    turn = np.vstack([turn, [-c * s, c * s, c * c - s * s]])
-    # σ in the ply is T σ, and ε in the strip is Tᵀ ε.
-    return np.linalg.inv(turn.T @ compliance @ turn)
-
-
-@pytest.mark.parametrize(
-    ("kind", "degrees"),
-    [("S8R", 0.0), ("S8R", 30.0), ("S8R", 45.0), ("S6", 30.0), ("S4", 30.0), ("S3", 30.0)],
-)
-def test_a_strip_pulled_off_its_fibres(unsheared, tmp_path, kind, degrees):
-    """1/E_x = c⁴/E1 + s⁴/E2 + (1/G12 − 2 ν12/E1) s² c², and how far it shears."""
-    (tmp_path / "strip.inp").write_text(pulled_strip(kind, flat=False))
-    options = [
-        "--material",
-        "UD",
-        "--thickness",
-        0.5,
-        "--plies",
-        "warp",
-        "--rotate",
-        0,
-        0,
-        -degrees,
-    ]
-    out = ["--out", tmp_path / "mapped.inp"]
-    assert command("map", unsheared, tmp_path / "strip.inp", *options, *out) == 0
-    angle = np.radians(degrees)
-    c, s = np.cos(angle), np.sin(angle)
-    stress = FORCE / WIDTH / 0.5
-    young = 1.0 / (c**4 / E1 + s**4 / E2 + (1.0 / G12 - 2.0 * NU12 / E1) * s * s * c * c)
-    found = strains(tmp_path, "mapped")
-    assert found[0] == pytest.approx(stress / young, rel=1e-4)
-    expected = np.linalg.solve(stiffness(angle), [stress, 0.0, 0.0])
-    np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-4 * expected[0])
-
-
-@pytest.mark.parametrize("constant", ["volume-fraction", "thickness"])
-@pytest.mark.parametrize("layup", ["warp-weft", "symmetric"])
-def test_a_strip_of_sheared_fabric_is_the_laminate_of_its_plies(folder, tmp_path, layup, constant):
-    """Kept flat, ε = A⁻¹ N with the plies at their own angles, 25 and 75 degrees from the strip.
-
-    The layer is thin: CalculiX makes solids of the plies, which slide on each other near free edges
-    (0.6 % in ε_x where the layer is 0.5 mm thick).
-    """
-    (tmp_path / "strip.inp").write_text(pulled_strip("S8R", flat=True))
-    options = ["--material", "UD", "--thickness", 0.05, "--plies", layup, "--constant", constant]
-    options += ["--warp-share", 0.4, "--rotate", 0, 0, -5.0]
-    out = ["--out", tmp_path / "mapped.inp"]
-    assert command("map", folder, tmp_path / "strip.inp", *options, *out) == 0
-    thickness = 0.05 / np.cos(GAMMA) if constant == "volume-fraction" else 0.05
-    plies = {np.radians(25.0): 0.4, np.radians(75.0): 0.6}
-    membrane = sum(share * thickness * stiffness(angle) for angle, share in plies.items())
-    expected = np.linalg.solve(membrane, [FORCE / WIDTH, 0.0, 0.0])
-    np.testing.assert_allclose(strains(tmp_path, "mapped"), expected, rtol=1e-4)
+    return run_folder(tmp_path_factory.mktemp("a run at rest"), NET, at_rest(NET))
 
 
 MESSY = """*Heading
@@ -399,7 +281,7 @@ def messy(tmp_path):
     nodes = [(0, 0), (90, 0), (180, 0), (0, 90), (90, 90), (180, 90), (999, 999), (90, 180)]
     lines = [f"{k}, {x}, {y}" for k, (x, y) in enumerate(nodes, start=1)]
     (tmp_path / "nodes of the part.inc").write_text("\n".join(lines) + "\n")
-    (tmp_path / "material.inc").write_text(MATERIAL)
+    (tmp_path / "material.inc").write_text("*MATERIAL, NAME=UD\n*ELASTIC\n1., 0.3\n")
     return path
 
 
@@ -421,7 +303,7 @@ def test_a_deck_keeps_what_is_not_of_the_fabric(unsheared, messy, capsys):
     again = read_deck(out)
     np.testing.assert_array_equal(again.points, mesh.points)
     np.testing.assert_array_equal(again.nodes, mesh.nodes)
-    new, old = again.deck.sections
+    old, new = again.deck.sections
     assert (new.name, new.elements) == ("FABRIC_1", {1})
     assert (old.name, old.elements) == ("EVERY_UNCOVERED", {2, 7, 8})
     for kept in ("*ELEMENT, TYPE=T3D2, ELSET=BARS", "*SOLID SECTION", "*CLOAD", "** a part"):
@@ -433,111 +315,7 @@ def test_a_deck_keeps_what_is_not_of_the_fabric(unsheared, messy, capsys):
     assert command("map", unsheared, out, *options, "--offset", -144, 0, 0) == 0
     third = read_deck(twice)
     names = [section.name for section in third.deck.sections]
-    assert sorted(names) == ["FABRIC2_1"] and third.deck.sections[0].elements == {1, 2, 7, 8}
-
-
-def test_calculix_takes_a_deck_that_is_half_covered(unsheared, tmp_path):
-    """The half without fabric keeps its 9 mm and its fibres along x, the other one gets 0.5 mm."""
-    (tmp_path / "strip.inp").write_text(pulled_strip("S8R", flat=False))
-    out = tmp_path / "mapped.inp"
-    options = ["--material", "UD", "--thickness", 9.0, "--plies", "warp", "--out", out]
-    assert command("map", unsheared, tmp_path / "strip.inp", *options, "--offset", 124, 0, 0) == 0
-    assert "EVERY" not in out.read_text() and "STRIP_UNCOVERED" in out.read_text()
-    expected = np.linalg.solve(stiffness(0.0), [FORCE / WIDTH / 9.0, 0.0, 0.0])
-    np.testing.assert_allclose(strains(tmp_path, "mapped"), expected, rtol=1e-3, atol=1e-12)
-
-
-def test_a_part_of_an_abaqus_model_gets_its_sections_inside_the_part(unsheared, tmp_path):
-    path, out = tmp_path / "model.inp", tmp_path / "mapped.inp"
-    path.write_text(
-        "*HEADING\nx\n*PART, NAME=Rig\n*NODE\n1, 5., 5., 5.\n*END PART\n*PART, NAME=Skin\n"
-        "*NODE\n1, 0., 0.\n2, 10., 0.\n3, 10., 10.\n4, 0., 10.\n"
-        "*ELEMENT, TYPE=S4R, ELSET=SKIN\n1, 1, 2, 3, 4\n*END PART\n*ASSEMBLY, NAME=A\n"
-        "*INSTANCE, NAME=I, PART=Skin\n*END INSTANCE\n*NSET, NSET=N, INSTANCE=I\n1\n"
-        "*END ASSEMBLY\n*MATERIAL, NAME=UD\n*STEP\n*STATIC\n*END STEP\n"
-    )
-    np.testing.assert_array_equal(read_deck(path).points[0], [0.0, 0.0, 0.0])
-    options = ["--material", "UD", "--thickness", 0.25, "--solver", "abaqus", "--out", out]
-    assert command("map", unsheared, path, *options) == 0
-    lines = out.read_text().splitlines()
-    at = {line: k for k, line in enumerate(lines)}
-    assert at["*DISTRIBUTION TABLE, NAME=FABRIC_ANGLE"] < at["*PART, NAME=Rig"]
-    section = at["*SHELL SECTION, ELSET=FABRIC, COMPOSITE, ORIENTATION=FABRIC_FIRST"]
-    assert at["*PART, NAME=Skin"] < section < at["*ASSEMBLY, NAME=A"]
-    assert lines[section + 3] == "*END PART"
-
-
-def keywords(path):
-    """(keyword line, data lines) of a deck, read by nothing of the package."""
-    found = []
-    for line in path.read_text().splitlines():
-        if line.startswith("*"):
-            found.append((line, []))
-        else:
-            found[-1][1].append(line)
-    return found
-
-
-@pytest.mark.parametrize("layup", ["warp-weft", "symmetric", "bisector"])
-def test_an_abaqus_deck_has_the_directions_as_distributions(folder, tmp_path, layup):
-    """Sets, tables and references as the keyword reference of Abaqus has them."""
-    part = flat_mesh("S6")
-    pv_mesh(part).save(tmp_path / "part.vtu")
-    out = tmp_path / "mapped.inp"
-    options = ["--material", "UD", "--thickness", 0.3, "--solver", "abaqus", "--plies", layup]
-    assert command("map", folder, tmp_path / "part.vtu", *options, "--out", out) == 0
-    blocks = keywords(out)
-    options_of = [
-        {k.strip(): v for k, _, v in (w.partition("=") for w in key.split(","))}
-        for key, _ in blocks
-    ]
-    tables = {
-        o["NAME"]: d
-        for o, (_, d) in zip(options_of, blocks, strict=True)
-        if "*DISTRIBUTION TABLE" in o
-    }
-    assert tables == {
-        "FABRIC_AXES": ["COORD3D, COORD3D"],
-        "FABRIC_ANGLE": ["ANGLE"],
-        "FABRIC_LENGTH": ["LENGTH"],
-    }
-    fields = {}
-    for given, (_, data) in zip(options_of, blocks, strict=True):
-        if "*DISTRIBUTION" in given:
-            assert given["LOCATION"] == "ELEMENT" and data[0].startswith(", ")
-            values = np.array([[float(w) for w in row.split(",")] for row in data[1:]])
-            np.testing.assert_array_equal(values[:, 0], part.numbers)
-            assert len(data[0].split(",")) == values.shape[1]
-            fields[given["NAME"]] = given["TABLE"], values[:, 1:]
-    (orientation,) = (d for k, d in blocks if k == "*ORIENTATION, NAME=FABRIC_FIRST")
-    assert orientation == ["FABRIC_FIRST_AXES", "3, 0."]
-    kind, axes = fields["FABRIC_FIRST_AXES"]
-    assert kind == "FABRIC_AXES"
-    _, warp, weft = sheared(GAMMA)
-    first = (warp + weft) / np.linalg.norm(warp + weft) if layup == "bisector" else warp
-    np.testing.assert_allclose(axes[:, :3], np.tile(first, (len(axes), 1)), atol=1e-9)
-    across = np.cross(part.normals, first)
-    np.testing.assert_allclose(axes[:, 3:], across, atol=1e-9)
-    (section,) = (d for k, d in blocks if k.startswith("*SHELL SECTION"))
-    # Angle from the first ply, its share of the thickness.
-    expected = {
-        "warp-weft": [(0.0, 0.5), (50.0, 0.5)],
-        "symmetric": [(0.0, 0.25), (50.0, 0.5), (0.0, 0.25)],
-        "bisector": [(0.0, 1.0)],
-    }[layup]
-    for line, (angle, share) in zip(section, expected, strict=True):
-        thickness, points, material, turned = (word.strip() for word in line.split(","))
-        assert (points, material) == ("3", "UD")
-        kind, values = fields[thickness]
-        assert kind == "FABRIC_LENGTH"
-        np.testing.assert_allclose(values, share * 0.3 / np.cos(GAMMA), rtol=1e-8)
-        if angle:
-            kind, values = fields[turned]
-            assert kind == "FABRIC_ANGLE"
-            np.testing.assert_allclose(values, angle, atol=1e-7)
-        else:
-            assert turned == "0."
-    assert any(key == "*ELEMENT, TYPE=STRI65, ELSET=PART" for key, _ in blocks)
+    assert names == ["FABRIC1_1"] and third.deck.sections[0].elements == {1, 2, 7, 8}
 
 
 def pv_mesh(mesh: ShellMesh) -> pv.UnstructuredGrid:
@@ -545,34 +323,6 @@ def pv_mesh(mesh: ShellMesh) -> pv.UnstructuredGrid:
     size = int(mesh.sizes[0])
     cells = np.insert(mesh.nodes[:, :size], 0, size, axis=1).ravel()
     return pv.UnstructuredGrid(cells, np.full(len(mesh.nodes), kinds[size]), mesh.points)
-
-
-def test_openradioss_drape(folder, tmp_path):
-    """Columns of 10, 10, 20 and 20 as OpenRadioss reads them; degrees from the reference."""
-    both = tmp_path / "part.vtu"
-    quads, triangles = flat_mesh("S4"), flat_mesh("S3")
-    above = replace(triangles, points=triangles.points + np.array([0.0, 0.0, 1.0]))
-    pv_mesh(quads).merge(pv_mesh(above)).save(both)
-    out = tmp_path / "fabric.rad"
-    options = ["--reference", 0, 1, 0, "--out", out]
-    assert command("map", folder, both, *options) == 0
-    lines = [line for line in out.read_text().splitlines() if not line.startswith("#")]
-    count = len(quads.numbers) + len(triangles.numbers)
-    assert len(lines) == 2 * (count + 2)
-    # The warp is 20 degrees from x, the weft 20 degrees from y; the layer is 1 / cos γ as thick.
-    for number, (title, angle) in enumerate((("fabric warp", -70.0), ("fabric weft", -20.0)), 1):
-        block = lines[(number - 1) * (count + 2) :][: count + 2]
-        assert block[:2] == [f"/DRAPE/{number}", title]
-        rows_ = [(r[:10], int(r[10:20]), float(r[20:40]), float(r[40:60])) for r in block[2:]]
-        assert all(len(row) == 60 for row in block[2:])
-        assert sorted({row[0] for row in rows_}) == ["SH3N      ", "SHELL     "]
-        assert [row[0].strip() for row in rows_].count("SHELL") == len(quads.numbers)
-        assert [row[1] for row in rows_] == list(range(1, count + 1))
-        np.testing.assert_allclose([row[2] for row in rows_], 1.0 / np.cos(GAMMA), rtol=1e-8)
-        np.testing.assert_allclose([row[3] for row in rows_], angle, atol=1e-7)
-    assert command("map", folder, both, "--constant", "thickness", *options) == 0
-    row = out.read_text().splitlines()[5]
-    assert float(row[20:40]) == 1.0
 
 
 def decoded(path):
@@ -597,8 +347,9 @@ def decoded(path):
     return found
 
 
-def test_table_and_vtk_hold_the_same(folder, tmp_path, capsys):
+def test_table_and_vtk_hold_the_same(tmp_path, capsys):
     """Weight and density of the fibres give the fraction, 600 / (1000 · 2.5 · 0.5) = 0.48."""
+    folder = run_folder(tmp_path / "run", NET, sheared(GAMMA)[0])
     mesh = flat_mesh("S8R", side=150.0)  # beyond the fabric
     part = tmp_path / "part.vtu"
     pv_mesh(mesh).save(part)
@@ -650,8 +401,11 @@ def test_meshes_of_several_kinds_are_read(unsheared, tmp_path):
 
 
 GOOD = ["map", "{run}", "{dir}/part.inp"]
+
 OUT = ["--out", "{dir}/out.csv"]
+
 DECK = ["--out", "{dir}/out.inp"]
+
 BAD = {
     "no mesh": (
         ["map", "{run}", "{dir}/none.vtu", *OUT],
@@ -666,6 +420,8 @@ BAD = {
     "lines": (["map", "{run}", "{dir}/lines.vtk", *OUT], "lines.vtk: no shell elements, allowed"),
     "solids": (["map", "{run}", "{dir}/solids.inp", *OUT], "solids.inp: no shell elements"),
     "no node": (["map", "{run}", "{dir}/lost.inp", *OUT], "line 3: element 7: there is no node 9"),
+    "no data": (["map", "{run}", "{dir}/empty.inp", *OUT], "empty.inp: no shell elements"),
+    "huge": (["map", "{run}", "{dir}/huge.inp", *OUT], "allowed is a number up to 999999999"),
     "circle": (["map", "{run}", "{dir}/circle.inp", *OUT], "files that include one another"),
     "short": (["map", "{run}", "{dir}/short.inp", *OUT], "S3 have a number and 3 nodes"),
     "far": (
@@ -759,6 +515,8 @@ def test_bad_input_is_one_line_and_writes_nothing(unsheared, tmp_path, capfd, na
         "part.inp": head + "*ELEMENT, TYPE=S3\n1, 1, 2, 3\n",
         "solids.inp": head + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n",
         "lost.inp": "*ELEMENT, TYPE=S3\n6, 1, 2, 3\n7, 1, 2, 9\n" + head,
+        "empty.inp": head + "*ELEMENT, TYPE=S3\n",
+        "huge.inp": head + "*ELEMENT, TYPE=S3\n1, 1, 2, 99999999999999999999\n",
         "short.inp": head + "*ELEMENT, TYPE=S3\n1, 1, 2\n",
         "circle.inp": "*INCLUDE, INPUT=circle.inp\n",
         "six.inp": head

@@ -82,11 +82,11 @@ def map(
         str | None, _option("--material", "NAME", "Of a ply, as it is called in the deck.")
     ] = None,
     offset: Annotated[
-        Vector, _option("--offset", "X Y Z", "Moves the part to its place among the tools [mm].")
+        Vector, _option("--offset", "X Y Z", "Moves the part to its place among the tools, in mm.")
     ] = (0.0, 0.0, 0.0),
     turn: Annotated[
         Vector,
-        _option("--rotate", "X Y Z", "Turns it before, about x, then y, then z [degrees]."),
+        _option("--rotate", "X Y Z", "Turns it before, about x, then y, then z, in degrees."),
     ] = (0.0, 0.0, 0.0),
     distance: Annotated[
         float, _option("--max-distance", "MM", "From an element to the fabric.")

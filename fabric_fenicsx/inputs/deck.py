@@ -22,6 +22,9 @@ SHELLS = {
 }
 """Number of nodes of each type of shell element."""
 
+LARGEST = 999_999_999
+"""Number of a node or an element."""
+
 DEEPEST = 20
 """Files that include one another; more are taken for a circle."""
 
@@ -56,7 +59,8 @@ class Deck:
         """The deck with other sections for some of its elements.
 
         A section that it has keeps the elements that are not covered; one without such elements
-        goes. New sections stand where the first such section was, where materials are known.
+        goes. New sections stand before the first step or the part's end: CalculiX wants materials
+        before them.
 
         Args:
             covered: numbers of the elements that the new sections are of.
@@ -64,8 +68,7 @@ class Deck:
             model: lines that have to stand outside of any part.
         """
         touched = [section for section in self.sections if section.elements & covered]
-        at = touched[0].start if touched else self.end
-        instead: dict[int, list[str]] = {at: [*sections]}
+        instead: dict[int, list[str]] = {self.end: [*sections]}
         gone: set[int] = set()
         for section in touched:
             gone |= set(range(section.start, section.stop))
@@ -106,7 +109,7 @@ class _Block:
     stop: int
 
 
-def read_deck(path: Path) -> ShellMesh:
+def read_deck(path: Path | str) -> ShellMesh:
     """Nodes and shell elements of a deck, flat or with one part that has shells.
 
     Included files (`*INCLUDE`, and `INPUT=` of any keyword) are looked for beside the deck and
@@ -115,6 +118,7 @@ def read_deck(path: Path) -> ShellMesh:
     Raises:
         InputError: it cannot be read, or its nodes, elements or sets contradict one another.
     """
+    path = Path(path)
     places = [*_lines(path, path.parent, 0)]
     blocks = _blocks(places)
     part, owner = "", {}
@@ -128,14 +132,13 @@ def read_deck(path: Path) -> ShellMesh:
         if block.keyword == "ELEMENT" and block.options.get("TYPE", "") in SHELLS
     ]
     parts = sorted({owner[number] for number in shells})
-    if not shells:
-        raise InputError(f"{path}: no shell elements, allowed are {', '.join(SHELLS)}")
     if len(parts) > 1:
         raise InputError(
             f"{path}: shell elements in {' and '.join(name or 'no part' for name in parts)},"
             " allowed are those of one part"
         )
-    mine = [block for number, block in enumerate(blocks) if owner[number] == parts[0]]
+    part = parts[0] if parts else ""
+    mine = [block for number, block in enumerate(blocks) if owner[number] == part]
     point_of, points = _nodes(mine)
     numbers: list[int] = []
     types: list[str] = []
@@ -150,22 +153,24 @@ def read_deck(path: Path) -> ShellMesh:
         connected.append(np.array([[point_of[node] for node in row[1:]] for row in ids], np.int64))
         numbers += [row[0] for row in ids]
         types += [block.options["TYPE"]] * len(ids)
-    if len(set(numbers)) < len(numbers):
-        twice = next(n for n in numbers if numbers.count(n) > 1)
-        raise InputError(f"{path}: two shell elements have the number {twice}")
-    sets = _sets(mine)
+    if not numbers:
+        raise InputError(f"{path}: no shell elements, allowed are {', '.join(SHELLS)}")
+    known, uses = np.unique(numbers, return_counts=True)
+    if uses.max() > 1:
+        raise InputError(f"{path}: two shell elements have the number {known[uses > 1][0]}")
     ours = frozenset(numbers)
+    sets = _sets(mine, ours)
     sections = [
         Section(
             block.start,
             block.stop,
             block.options.get("ELSET", ""),
-            ours & sets.get(block.options.get("ELSET", ""), frozenset()),
+            sets.get(block.options.get("ELSET", ""), frozenset()),
         )
         for block in mine
         if block.keyword in ("SHELL SECTION", "SHELL GENERAL SECTION")
     ]
-    deck = Deck([line for line, _ in places], sections, *_openings(blocks, parts[0], len(places)))
+    deck = Deck([line for line, _ in places], sections, *_openings(blocks, part, len(places)))
     try:
         return ShellMesh(
             np.array(points, dtype=np.float64).reshape(-1, 3),
@@ -259,6 +264,8 @@ def _nodes(blocks: list[_Block]) -> tuple[dict[int, int], list[list[float]]]:
             try:
                 number = int(words[0])
                 point = [float(word) if word.strip() else 0.0 for word in words[1:4]]
+                if not 0 < number <= LARGEST:
+                    raise ValueError
             except ValueError:
                 raise InputError(f"{place}: {line.strip()!r} is not a node") from None
             # A node given twice is where it was given last.
@@ -272,10 +279,9 @@ def _elements(block: _Block, size: int) -> tuple[list[str], list[list[int]]]:
     words = [(w, place) for line, place in block.data for w in line.split(",") if w.strip()]
     numbers = []
     for word, place in words:
-        try:
-            numbers.append(int(word))
-        except ValueError:
-            raise InputError(f"{place}: {word.strip()!r} is not a number of an element") from None
+        if not word.strip().isdecimal() or int(word) > LARGEST:
+            raise InputError(f"{place}: {word.strip()!r}, allowed is a number up to {LARGEST}")
+        numbers.append(int(word))
     if len(numbers) % (size + 1):
         raise InputError(
             f"{words[-1][1]}: elements {block.options['TYPE']} have a number and {size} nodes"
@@ -284,8 +290,8 @@ def _elements(block: _Block, size: int) -> tuple[list[str], list[list[int]]]:
     return [words[i][1] for i in starts], [numbers[i : i + size + 1] for i in starts]
 
 
-def _sets(blocks: list[_Block]) -> dict[str, frozenset[int]]:
-    """Numbers of the elements of each set."""
+def _sets(blocks: list[_Block], shells: frozenset[int]) -> dict[str, frozenset[int]]:
+    """Numbers of the shell elements of each set."""
     sets: dict[str, frozenset[int]] = {}
     for block in blocks:
         name = block.options.get("ELSET")
@@ -299,12 +305,13 @@ def _sets(blocks: list[_Block]) -> dict[str, frozenset[int]]:
             words = [word.strip().upper() for word in line.split(",") if word.strip()]
             if "GENERATE" in block.options:
                 try:
-                    first, last, *step = map(int, words)
-                    found |= set(range(first, last + 1, *step))
-                except (ValueError, TypeError):
+                    first, last, step = map(int, [*words, "1"][:3])
+                    # Not the numbers themselves: there may be any number of them.
+                    found |= {n for n in shells if n in range(first, last + 1, step)}
+                except ValueError:
                     raise InputError(f"{place}: allowed is first, last and step") from None
                 continue
             for word in words:
-                found |= {int(word)} if word.isdigit() else sets.get(word, frozenset())
-        sets[name] = sets.get(name, frozenset()) | found
+                found |= {int(word)} if word.isdecimal() else sets.get(word, frozenset())
+        sets[name] = sets.get(name, frozenset()) | (found & shells)
     return sets

@@ -7,6 +7,7 @@ its share of the thickness; one ply along the warp or along the bisector can be 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 import numpy.typing as npt
@@ -243,12 +244,10 @@ def _angle(start: Array, along: Array, normals: Array) -> Array:
 
 
 def _unused(name: str, deck: Deck) -> str:
-    """A name with which none in the deck begins."""
+    """A name that stands nowhere in the deck, with a number behind it where it must."""
     text = "\n".join(deck.lines).upper()
-    number = 1
-    while (name if number == 1 else f"{name}{number}") + "_" in text:
-        number += 1
-    return name if number == 1 else f"{name}{number}"
+    names = (f"{name}{number or ''}" for number in count())
+    return next(name for name in names if name not in text)
 
 
 def _deck(mesh: ShellMesh, names: dict[int, str]) -> Deck:
