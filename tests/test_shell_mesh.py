@@ -130,6 +130,17 @@ def test_uniform_shear_is_the_same_in_every_element(kind):
     assert warp_share(NET) == pytest.approx(0.5, rel=1e-12)
 
 
+def test_the_angle_between_the_fibres_stays_where_an_element_is_tilted():
+    """By 40 degrees about x: so are warp and weft, whatever the element's corners say."""
+    snapshot, warp, weft = sheared(GAMMA)
+    tilt = Placement((np.radians(40.0), 0.0, 0.0)).rotation
+    mesh = flat_mesh("S4", side=4.0)
+    fibres = on_shells(fibre_map(NET, snapshot), replace(mesh, points=mesh.points @ tilt.T))
+    assert fibres.covered.all()
+    for found, expected in ((fibres.warp, tilt @ warp), (fibres.weft, tilt @ weft)):
+        np.testing.assert_allclose(found, np.tile(expected, (len(found), 1)), atol=1e-12)
+
+
 def flipped(mesh: ShellMesh):
     """Nodes in the other sense of rotation."""
     size = int(mesh.sizes[0])
