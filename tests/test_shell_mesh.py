@@ -21,7 +21,7 @@ from solve import orders
 from test_output import NET, square
 from test_views import command, sheared, write_step
 
-from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.fabric.net import Net, single_tow
 from fabric_fenicsx.inputs.deck import read_deck
 from fabric_fenicsx.inputs.shell_mesh import ShellMesh, padded
 from fabric_fenicsx.output.fibres import FibreMap, fibre_map
@@ -409,6 +409,16 @@ def test_meshes_of_several_kinds_are_read(unsheared, tmp_path):
         np.testing.assert_allclose(made.compute_cell_sizes()["Area"], areas)
         assert made["covered"].all()
         np.testing.assert_array_equal(made["element"], [1, 2])
+
+
+def test_a_net_without_crossings_is_one_line(tmp_path, capsys):
+    points = np.column_stack([np.arange(5.0), np.zeros((5, 2))])
+    tow = single_tow(points, (0.0, 0.0, 1.0))
+    run = run_folder(tmp_path / "run", tow, at_rest(tow))
+    pv_mesh(flat_mesh("S4")).save(tmp_path / "part.vtu")
+    assert command("map", run, tmp_path / "part.vtu", "--out", tmp_path / "a.csv") == 2
+    error = capsys.readouterr().err
+    assert error == f"{run}: the fabric has no meshes between its crossings\n"
 
 
 GOOD = ["map", "{run}", "{dir}/part.inp"]

@@ -131,7 +131,7 @@ def map(
         raise InputError(f"{decks[0]}: a deck needs --material and --thickness")
     if material is not None and (not material.strip() or set(material) & set(",*\n\r")):
         raise InputError(f"--material: {material!r}, allowed is a name without comma and asterisk")
-    mesh: ShellMesh = read_shell_mesh(part)
+    mesh = read_shell_mesh(part)
     net, snapshot, tools = results.at(results.nearest(time), mirror=mirror)
     share = warp_share(net) if share is None else share
     _within("--warp-share", share, 0.0, 1.0)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..inputs.keys import one_of
 from .meshio_files import meshio_endings
+
+if TYPE_CHECKING:
+    from ..inputs.shell_mesh import ShellMesh
 
 __all__ = ["read_shell_mesh"]
 
@@ -19,7 +22,7 @@ VTK = (".vtu", ".vtk", ".vtp", ".stl", ".ply", ".obj")
 """Endings of files that need no meshio."""
 
 
-def read_shell_mesh(path: Path) -> Any:
+def read_shell_mesh(path: Path) -> ShellMesh:
     """Shell elements of a file: a deck of Abaqus or CalculiX, VTK's formats, those of meshio.
 
     Elements of files without numbers count from 1, shells only, in the file's order; the ninth
@@ -27,9 +30,6 @@ def read_shell_mesh(path: Path) -> Any:
 
     Args:
         path: the file.
-
-    Returns:
-        The `ShellMesh`.
 
     Raises:
         InputError: it cannot be read or has no shell elements; one line.
@@ -65,7 +65,7 @@ def _grid(path: Path, *, vtk: bool) -> Any:
         vtkObject.GlobalWarningDisplayOn()
 
 
-def _shells(grid: Any) -> Any:
+def _shells(grid: Any) -> ShellMesh:
     """The triangles and quadrilaterals among the cells."""
     from ..inputs.shell_mesh import NAMES, ShellMesh, padded
 
