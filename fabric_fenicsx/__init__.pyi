@@ -15,7 +15,9 @@ from .fabric.outline import Circle as Circle
 from .fabric.outline import Outline as Outline
 from .fabric.outline import Polygon as Polygon
 from .fabric.outline import rectangle as rectangle
+from .fabric.section import BundleSection as BundleSection
 from .fabric.section import CoupledSection as CoupledSection
+from .fabric.section import FabricSection as FabricSection
 from .fabric.section import RectangularSection as RectangularSection
 from .fabric.sheet import Sheet as Sheet
 from .fabric.sheet import centred_sheet as centred_sheet
@@ -23,6 +25,14 @@ from .fabric.sheet import spaced_sheet as spaced_sheet
 from .fabric.weave import WEAVES as WEAVES
 from .fabric.weave import WeavePattern as WeavePattern
 from .fabric.weave import pattern_from_file as pattern_from_file
+from .geometry.formed import FormedHemisphere as FormedHemisphere
+from .geometry.formed import FormedSurface as FormedSurface
+from .geometry.formed_mould import FormedMould as FormedMould
+from .geometry.formed_mould import round_die as round_die
+from .geometry.kinematic_net import KinematicNet as KinematicNet
+from .geometry.kinematic_net import net_on_surface as net_on_surface
+from .geometry.triangles import Triangles as Triangles
+from .geometry.triangles import read_stl as read_stl
 from .inputs.deck import read_deck as read_deck
 from .inputs.parameters import Parameter as Parameter
 from .inputs.shell_mesh import ShellMesh as ShellMesh
@@ -54,6 +64,7 @@ from .mechanics.tools import Mould as Mould
 from .mechanics.tools import Sphere as Sphere
 from .output.fibres import FibreMap as FibreMap
 from .output.fibres import fibre_map as fibre_map
+from .output.kinematic import draw_kinematic as draw_kinematic
 from .output.pictures import draw_net as draw_net
 from .output.results import read_results as read_results
 from .output.shells import Placement as Placement
@@ -64,6 +75,7 @@ from .output.surfaces import TriangleSurface as TriangleSurface
 from .output.weaves import draw_weave as draw_weave
 from .rigs.common import mesh as mesh
 from .rigs.drape import symmetry_planes as symmetry_planes
+from .rigs.kinematic import kinematic_net as kinematic_net
 from .rigs.load import load_case as load_case
 from .rigs.run import make_case as make_case
 from .rigs.run import run as run

@@ -101,8 +101,15 @@ def on_surface(spacing: float) -> tuple[Net, Snapshot]:
     along = np.where((net.node_family == net.node_family[0])[:, None], warp, weft)
     directors = np.stack([along, np.cross(up, along), up], axis=1)
     shear = np.arcsin(np.einsum("ij,ij->i", warp, weft))[net.crossings[:, 0]]
+    axes = along[net.crossings]
     rest = at_rest(net)
-    bent = replace(rest, displacement=place - net.points, directors=directors, shear_angle=shear)
+    bent = replace(
+        rest,
+        displacement=place - net.points,
+        directors=directors,
+        shear_angle=shear,
+        axes=axes,
+    )
     return net, bent
 
 

@@ -16,6 +16,7 @@ from test_output import NET, dome, square
 
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.errors import InputError
+from fabric_fenicsx.fabric.axes import tow_axes
 from fabric_fenicsx.fabric.crossings import crossing_numbers
 from fabric_fenicsx.output.fibres import fibre_map
 from fabric_fenicsx.output.files import write_npz
@@ -44,8 +45,12 @@ def state(net, time: float) -> Snapshot:
     """A hill that grows with time; directors along the bent tows."""
     flat = dome(net, time)
     share = time / 4.0
+    displacement = share * flat.displacement
     return replace(
-        flat, displacement=share * flat.displacement, shear_angle=share * flat.shear_angle
+        flat,
+        displacement=displacement,
+        axes=tow_axes(net, displacement, symmetry=(0, 1) if net is QUARTER else ()),
+        shear_angle=share * flat.shear_angle,
     )
 
 
@@ -90,6 +95,7 @@ def test_whole_sheet_is_the_sheet_of_which_the_quarter_is_one():
     b = by_place(NET.points[NET.crossings[:, 0]])
     # Shear changes its sign from quarter to quarter, as x y does.
     np.testing.assert_allclose(whole.shear_angle[a], same.shear_angle[b], atol=1e-12)
+    np.testing.assert_allclose(whole.axes[a], same.axes[b], atol=1e-12)
     numbers, expected = np.column_stack(crossing_numbers(net)), crossing_numbers(NET)
     np.testing.assert_array_equal(numbers[a], np.column_stack(expected)[b])
 
@@ -137,11 +143,13 @@ def sheared(gamma: float):
     x, y = NET.points[:, :1], NET.points[:, 1:2]
     up = np.array([0.0, 0.0, 1.0])
     directors = np.array([[v, np.cross(up, v), up] for v in (warp, weft)])[NET.node_family]
+    displacement = x * warp + y * weft - NET.points
     return (
         replace(
             rest,
-            displacement=x * warp + y * weft - NET.points,
+            displacement=displacement,
             directors=directors,
+            axes=tow_axes(NET, displacement),
             shear_angle=np.full(len(NET.crossings), gamma),
         ),
         warp,

@@ -41,7 +41,8 @@ class FibreMap:
         warp: unit vector along the warp, shape (n, 3).
         weft: unit vector along the weft, shape (n, 3).
         normal: unit vector across both, shape (n, 3).
-        shear: shear angle γ [rad], shape (n,).
+        shear: shear angle γ of the tows' axes [rad], shape (n,).
+        turn: the same of the directors, which the crossings' springs feel [rad], shape (n,).
         density: areal density of fibres over that of the flat sheet, shape (n,).
         mould: name of the tool that the fabric touches, empty where none, length n.
         moved: how far the place was moved onto the mould [mm], shape (n,).
@@ -55,6 +56,7 @@ class FibreMap:
     weft: Array
     normal: Array
     shear: Array
+    turn: Array
     density: Array
     mould: list[str]
     moved: Array
@@ -69,6 +71,7 @@ class FibreMap:
             vectors = getattr(self, name)
             columns |= {f"{name}_{axis}": vectors[:, i] for i, axis in enumerate("xyz")}
         columns["shear_deg"] = np.degrees(self.shear)
+        columns["director_turn_deg"] = np.degrees(self.turn)
         columns["density_factor"] = self.density
         columns["mould"] = self.mould
         columns["moved_mm"] = self.moved
@@ -81,6 +84,7 @@ class FibreMap:
         for name in ("warp", "weft", "normal"):
             mesh[name] = getattr(self, name)
         mesh["shear_deg"] = np.degrees(self.shear)
+        mesh["director_turn_deg"] = np.degrees(self.turn)
         mesh["density_factor"] = self.density
         mesh["moved_mm"] = self.moved
         return mesh
@@ -101,10 +105,9 @@ def fibre_map(net: Net, snapshot: Snapshot, tools: Sequence[TriangleSurface] = (
         ValueError: the snapshot belongs to another net.
     """
     snapshot.check(net)
-    warp_nodes, weft_nodes = net.crossings.T
     flat = net.points[net.crossings].mean(axis=1)
     place = flat + snapshot.displacement[net.crossings].mean(axis=1)
-    warp, weft = (snapshot.directors[nodes, 0] for nodes in (warp_nodes, weft_nodes))
+    warp, weft = (snapshot.axes[:, side].copy() for side in (0, 1))
     up = snapshot.directors[net.crossings, 2].sum(axis=1)
     reference = reference_angle(net)
 
@@ -131,6 +134,7 @@ def fibre_map(net: Net, snapshot: Snapshot, tools: Sequence[TriangleSurface] = (
         weft=weft,
         normal=normal,
         shear=snapshot.shear_angle,
+        turn=snapshot.director_turn,
         density=np.cos(reference) / np.cos(reference + snapshot.shear_angle),
         mould=mould,
         moved=moved,

@@ -102,6 +102,7 @@ def _doubled(net: Net, snapshot: Snapshot, axis: int) -> tuple[Net, Snapshot]:
     directors = snapshot.directors * flip * signs[:, :, None]
     force_signs = _image_signs(mirrored, turned, kept=(1, -1, 1), reversed_=(1, -1, -1))
     moment_signs = _image_signs(mirrored, turned, kept=(-1, 1, -1), reversed_=(-1, 1, 1))
+    axis_signs = np.where(node_turned[net.crossings], -1.0, 1.0)[:, :, None]
     state = replace(
         snapshot,
         displacement=np.concatenate([snapshot.displacement, snapshot.displacement[new] * flip]),
@@ -109,7 +110,9 @@ def _doubled(net: Net, snapshot: Snapshot, axis: int) -> tuple[Net, Snapshot]:
         section_forces=snapshot.section_forces[source] * force_signs,
         section_moments=snapshot.section_moments[source] * moment_signs,
         contact_pressure=np.append(snapshot.contact_pressure, snapshot.contact_pressure[new]),
+        axes=np.concatenate([snapshot.axes, (snapshot.axes * flip * axis_signs)[crossed]]),
         shear_angle=np.append(snapshot.shear_angle, -snapshot.shear_angle[crossed]),
+        director_turn=np.append(snapshot.director_turn, -snapshot.director_turn[crossed]),
         crossing_moment=np.append(snapshot.crossing_moment, -snapshot.crossing_moment[crossed]),
     )
     return _renumbered(whole, state)

@@ -224,4 +224,6 @@ def _add_crossings(grid: vtkUnstructuredGrid, net: Net, snapshot: Snapshot) -> N
     at_points.AddArray(_array("displacement", displacement))
     at_points.AddArray(_array("shear_angle_deg", shear))
     at_points.AddArray(_array("angle_deg", 90.0 - shear))
+    turn = np.degrees(snapshot.director_turn)
+    at_points.AddArray(_array("director_turn_deg", turn))
     at_points.AddArray(_array("moment", snapshot.crossing_moment))

@@ -34,7 +34,7 @@ __all__ = ["Record", "load_state", "write_result"]
 PLATE_EXTENT = 1.24
 """How far out die and holder are drawn, over the farthest node of the flat sheet."""
 
-STEP_SCHEMA = "fabric-step/3"
+STEP_SCHEMA = "fabric-step/4"
 
 STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6 * DEPTH}
 """What a step file has for each node, and how many numbers of it."""

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
 
+from ..fabric.axes import axes_shear
 from ..fabric.crossings import reference_angle
 from ..fabric.layout import TowLayout
 from ..fabric.net import Net
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from .common import Session
     from .simulation import Run
 
-__all__ = ["RIG", "DrapeCase", "angles_at", "build", "run", "tools"]
+__all__ = ["RIG", "DrapeCase", "build", "run", "shear_at", "tools"]
 
 
 class ContactKeys(Keys):
@@ -103,6 +104,11 @@ class DrapeCase(Case):
     gravity_mm_s2: NotNegative = Field(9810.0, description="downwards")
     contact: ContactKeys = Field(default_factory=ContactKeys, description="tows on tools")
     points: list[PointKeys] = Field(default_factory=list, description="where angles are compared")
+
+    @property
+    def spacings(self) -> tuple[float, float]:
+        """Of the warp and of the weft tows [mm]."""
+        return self.sheet.warp_spacing_mm, self.sheet.weft_spacing_mm
 
     @model_validator(mode="after")
     def _fits(self) -> DrapeCase:
@@ -239,7 +245,7 @@ def build(case: DrapeCase, session: Session) -> Model:
     return fabric_model(
         case,
         net,
-        (keys.warp_spacing_mm, keys.weft_spacing_mm),
+        case.spacings,
         session,
         gravity=(0.0, 0.0, -case.gravity_mm_s2),
         inertia=GeneralisedAlpha(case.solver.spectral_radius),
@@ -249,33 +255,40 @@ def build(case: DrapeCase, session: Session) -> Model:
         contact_law=contact_law(case.contact),
         pressed=pressed(case),
         supports=symmetry_planes(net) if case.symmetry == "quarter" else (),
+        symmetry=(0, 1) if case.symmetry == "quarter" else (),
         **({} if weave is None else crossing_weights(weave, keys, net, session.base)),
     )
 
 
-def tow_angles(net: Net, shear_angle: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Acute angle between the tows of each crossing [degrees], from its shear angle γ [rad]."""
-    return 90.0 - np.degrees(np.abs(shear_angle + reference_angle(net)))
-
-
-def angles_at(
-    net: Net, shear_angle: npt.NDArray[np.float64], places: npt.NDArray[np.float64]
+def shear_at(
+    net: Net, shear: npt.NDArray[np.float64], places: npt.NDArray[np.float64], *, quarter: bool
 ) -> npt.NDArray[np.float64]:
-    """Angle between the tows [degrees] at places on the flat sheet.
+    """A signed angle at places on the flat sheet, from its values at the crossings.
 
-    Linear between the crossings, the nearest crossing's outside of them. The acute angle, as a
-    protractor on a photograph gives it.
+    Cubic and once continuously differentiable between them (Clough and Tocher), the nearest
+    crossing's outside of them.
 
     Args:
         net: the net.
-        shear_angle: γ of its crossings [rad], (n_crossings,).
+        shear: at its crossings, in any unit, (n_crossings,).
         places: x and y on the undeformed sheet [mm], (n, 2).
+        quarter: whether the net is the part x >= 0, y >= 0 of a sheet; places may be anywhere, and
+            the angle changes its sign across either axis.
     """
     flat = net.points[net.crossings].mean(axis=1)[:, :2]
-    angle = tow_angles(net, shear_angle)
-    inside = LinearNDInterpolator(flat, angle)(places)
-    outside = NearestNDInterpolator(flat, angle)(places)
-    return np.where(np.isnan(inside), outside, inside)
+    sign = np.ones(len(places))
+    if quarter:
+        sign = np.where(places.prod(axis=1) < 0.0, -1.0, 1.0)
+        places = np.abs(places)
+        inside = (flat > 1e-9 * np.ptp(flat)).all(axis=1)
+        images = [inside, flat[:, 0] > 0.0, flat[:, 1] > 0.0]
+        flips = ((-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0))
+        mirrored = [flat[own] * flip for own, flip in zip(images, flips, strict=True)]
+        signed = [shear[own] * np.prod(flip) for own, flip in zip(images, flips, strict=True)]
+        flat, shear = np.vstack([flat, *mirrored]), np.concatenate([shear, *signed])
+    between = CloughTocher2DInterpolator(flat, shear)(places)
+    outside = NearestNDInterpolator(flat, shear)(places)
+    return sign * np.where(np.isnan(between), outside, between)
 
 
 def run(case: DrapeCase, session: Session) -> dict[str, Any]:
@@ -322,21 +335,39 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             "largest_shear_angle_deg": row["largest_shear_deg"],
             "lowest_point_mm": lowest(net, snapshot.displacement),
             "kinetic_over_stored_energy": _kinetic_share(outcome.rows),
-            "points": _points(case, net, snapshot),
+            "points": _points(case, session, net, outcome),
         }
         if session.root and session.pictures:
             _draw(case, session, model, snapshot)
     return extend(outcome.summary, quantities, session)
 
 
-def _points(case: DrapeCase, net: Net, snapshot: Snapshot) -> list[dict[str, Any]]:
-    places = np.array([[p.x_mm, p.y_mm] for p in case.points]).reshape(-1, 2)
-    if case.symmetry == "quarter":
-        places = np.abs(places)
-    angles = angles_at(net, snapshot.shear_angle, places) if len(places) else np.zeros(0)
+def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[dict[str, Any]]:
+    """The case's points with the acute angle there, as a protractor on a photograph gives it."""
+    from .kinematic import known_angles
+
+    snapshot = outcome.last
+    if not case.points or snapshot is None:
+        return []
+    places = np.array([[p.x_mm, p.y_mm] for p in case.points])
+    quarter = case.symmetry == "quarter"
+    axes, directors = (
+        np.degrees(shear_at(net, shear, places, quarter=quarter))
+        for shear in (
+            axes_shear(snapshot.axes),
+            reference_angle(net) + snapshot.director_turn,
+        )
+    )
+    known = known_angles(case, session.base) if outcome.completed else [None] * len(places)
     return [
-        {**point.model_dump(exclude_none=True), "angle_deg": round(float(angle), 3)}
-        for point, angle in zip(case.points, angles, strict=True)
+        {
+            **point.model_dump(exclude_none=True),
+            "angle_deg": round(90.0 - abs(float(shear)), 3),
+            "shear_deg": round(float(shear), 3),
+            "director_turn_deg": round(float(turn), 3),
+            **({} if kinematic is None else {"kinematic_deg": kinematic}),
+        }
+        for point, shear, turn, kinematic in zip(case.points, axes, directors, known, strict=True)
     ]
 
 
@@ -354,7 +385,10 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
     now = flat + snapshot.displacement[net.crossings].mean(axis=1)
     columns = {"x0_mm": flat[:, 0], "y0_mm": flat[:, 1]}
     columns |= {f"{axis}_mm": now[:, i] for i, axis in enumerate("xyz")}
-    columns["angle_deg"] = tow_angles(net, snapshot.shear_angle)
+    shear = np.degrees(axes_shear(snapshot.axes))
+    columns["angle_deg"] = 90.0 - np.abs(shear)
+    columns["shear_deg"] = shear
+    columns["director_turn_deg"] = np.degrees(reference_angle(net) + snapshot.director_turn)
     write_table(session, "crossings.csv", columns)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
+from ..fabric.axes import TowAxes, axes_shear
 from ..fabric.net import Net
 from ..fabric.section import Section
 from ..mechanics import beam, inertia
@@ -78,6 +79,8 @@ class Model:
         pressed: tools pushed downwards by a force [N] at a time, by their names, instead of by
             their paths; see solving.pressed.
         supports: prescribed motions.
+        symmetry: axes whose planes through the origin mirror the net (0: x = 0, 1: y = 0), for the
+            tows' directions there; what holds the nodes in the planes are supports.
         interlacing: share of the in-plane moments at each crossing, (n_crossings,), where they are
             due to how the tows float over each other; by default 1.
         patch: share of the other moments; by default 1.
@@ -103,6 +106,7 @@ class Model:
         contact_law: ContactLaw | None = None,
         pressed: Mapping[str, Callable[[float], float]] | None = None,
         supports: Sequence[Support] = (),
+        symmetry: Sequence[int] = (),
         interlacing: Array | None = None,
         patch: Array | None = None,
         extra: Callable[[TowFields, ConnectorFields | None], Sequence[Term]] | None = None,
@@ -117,6 +121,8 @@ class Model:
         self.net, self.comm = net, comm
         self.time = 0.0
         self._supports = list(supports)
+        self._axes = TowAxes.of(net, symmetry)
+        self._reference_shear = axes_shear(self._axes.at(np.zeros_like(net.points)))
         self.disc = Discretisation(net, stiffness, mass, comm, interlacing, patch)
         self.fields = self.disc.tows
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
@@ -375,14 +381,18 @@ class Model:
         for tool in self.tools:
             force = self.system.term_forces(tool.name)[:, :3]
             pressure[:, 0] += np.linalg.norm(force, axis=1)
+        displacement = disc.gather_nodes(u[: disc.owned])
+        axes = self._axes.at(displacement)
         return Snapshot(
             time=time,
-            displacement=disc.gather_nodes(u[: disc.owned]),
+            displacement=displacement,
             directors=directors,
             section_forces=forces[:, :3],
             section_moments=forces[:, 3:],
             contact_pressure=disc.gather_nodes(pressure)[:, 0] / net.node_lengths,
-            shear_angle=self.shear_angles(),
+            axes=axes,
+            shear_angle=axes_shear(axes) - self._reference_shear,
+            director_turn=self.shear_angles(),
             crossing_moment=np.zeros(0) if self.crossings is None else self.crossings.moments(),
         )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ..fabric.axes import tow_axes
 from ..fabric.net import Net
 
 __all__ = ["Snapshot", "at_rest"]
@@ -26,7 +27,12 @@ class Snapshot:
         section_moments: torsion M1, out-of-plane bending M2 (about d2) and in-plane bending M3
             (about d3) [N mm], shape (n_cells, 3).
         contact_pressure: contact force per tow length [N/mm], shape (n_nodes,).
-        shear_angle: by how much each crossing has closed or opened [rad], shape (n_crossings,).
+        axes: unit tangents of warp and weft at each crossing, shape (n_crossings, 2, 3), see
+            fabric.axes.
+        shear_angle: by how much the angle between these has closed or opened [rad], shape
+            (n_crossings,).
+        director_turn: the same of the directors of a crossing's nodes [rad], which its springs
+            feel, shape (n_crossings,).
         crossing_moment: moment between the tows of each crossing [N mm], shape (n_crossings,).
 
     Raises:
@@ -39,7 +45,9 @@ class Snapshot:
     section_forces: npt.NDArray[np.float64]
     section_moments: npt.NDArray[np.float64]
     contact_pressure: npt.NDArray[np.float64]
+    axes: npt.NDArray[np.float64]
     shear_angle: npt.NDArray[np.float64]
+    director_turn: npt.NDArray[np.float64]
     crossing_moment: npt.NDArray[np.float64]
 
     def __post_init__(self) -> None:
@@ -65,7 +73,9 @@ class Snapshot:
             ("section_forces", (cells, 3)),
             ("section_moments", (cells, 3)),
             ("contact_pressure", (nodes,)),
+            ("axes", (crossings, 2, 3)),
             ("shear_angle", (crossings,)),
+            ("director_turn", (crossings,)),
             ("crossing_moment", (crossings,)),
         ]
         for name, shape in shapes:
@@ -99,6 +109,8 @@ def at_rest(net: Net, time: float = 0.0) -> Snapshot:
         section_forces=np.zeros((cells, 3)),
         section_moments=np.zeros((cells, 3)),
         contact_pressure=np.zeros(nodes),
+        axes=tow_axes(net, np.zeros((nodes, 3))),
         shear_angle=np.zeros(crossings),
+        director_turn=np.zeros(crossings),
         crossing_moment=np.zeros(crossings),
     )

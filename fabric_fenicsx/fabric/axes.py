@@ -1,0 +1,155 @@
+"""The directions of the tows where they cross, and the angle between them.
+
+A tow's axis at a crossing is the slope of the polynomial through the crossing's place and its
+neighbours' on the tow, two to either side: fourth order in the spacing, and blind to waves between
+crossings. What a protractor on a photograph measures is the angle between two such axes; the
+springs of a crossing feel the turn of the nodes' directors instead, which parts from it where tows
+bend within a spacing or stand on edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .net import Net
+
+__all__ = ["TowAxes", "axes_shear", "tow_axes"]
+
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+#: Places to either side of a crossing that its slope is taken from.
+REACH = 2
+
+#: Distance from a plane of symmetry [part of the net's size] at which a tow counts as ending in it.
+IN_PLANE = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TowAxes:
+    """The slopes as weighted sums of places of nodes.
+
+    Attributes:
+        net: the net.
+        nodes: whose places, for the warp and the weft of each crossing, (n_crossings, 2, 5).
+        weights: of their coordinates [1/mm], (n_crossings, 2, 5, 3).
+    """
+
+    net: Net
+    nodes: Integers
+    weights: Floats
+
+    @classmethod
+    def of(cls, net: Net, symmetry: Sequence[int] = ()) -> TowAxes:
+        """Those of a net.
+
+        Near a free end of a tow fewer places count, the tow's end among them. In a plane of
+        symmetry the tow goes on as its image.
+
+        Args:
+            net: the net.
+            symmetry: axes whose planes through the origin mirror the net: 0 for x = 0, 1 for y = 0.
+        """
+        count = len(net.crossings)
+        nodes = np.zeros((count, 2, 2 * REACH + 1), dtype=np.int64)
+        weights = np.zeros((count, 2, 2 * REACH + 1, 3))
+        tow = np.zeros(len(net.points), dtype=np.int64)
+        tow[net.cells.ravel()] = np.repeat(net.cell_tow, 2)
+        for side in (0, 1):
+            order = np.argsort(net.crossings[:, side])  # nodes rise along each tow
+            owner = tow[net.crossings[order, side]]
+            for own in np.split(order, np.flatnonzero(np.diff(owner)) + 1):
+                if len(own):
+                    line = net.crossings[own, side]
+                    ends = net.ends[tow[line[0]]]
+                    nodes[own, side], weights[own, side] = _on_tow(net, line, ends, symmetry)
+        return cls(net, nodes, weights)
+
+    def at(self, displacement: Floats) -> Floats:
+        """Unit tangents of warp and weft at each crossing, along the tows' senses.
+
+        Args:
+            displacement: of the net's nodes [mm], (n_nodes, 3).
+
+        Returns:
+            Of warp and of weft, shape (n_crossings, 2, 3).
+        """
+        places = self.net.points + displacement
+        slopes = (self.weights * places[self.nodes]).sum(axis=2)
+        return slopes / np.linalg.norm(slopes, axis=-1, keepdims=True)
+
+
+def tow_axes(net: Net, displacement: Floats, *, symmetry: Sequence[int] = ()) -> Floats:
+    """Unit tangents of warp and weft at each crossing of a net, see TowAxes."""
+    return TowAxes.of(net, symmetry).at(displacement)
+
+
+def axes_shear(axes: Floats) -> Floats:
+    """How far the angle from weft to warp falls short of 90° [rad], (n_crossings,), signed.
+
+    arcsin(s·t), with t the warp's and s the weft's axis: the shear angle γ of a sheet whose tows
+    cross at right angles; it needs no normal.
+    """
+    warp, weft = axes[:, 0], axes[:, 1]
+    cosine = np.einsum("ij,ij->i", warp, weft)
+    return np.arctan2(cosine, np.linalg.norm(np.cross(weft, warp), axis=1))
+
+
+def _on_tow(
+    net: Net, line: Integers, ends: Integers, symmetry: Sequence[int]
+) -> tuple[Integers, Floats]:
+    """Nodes (n, 5) and weights (n, 5, 3) of the n crossings of a tow, in its order."""
+    place = net.points[line]
+    s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
+    node, at, sign = list(line), list(s), [np.ones(3)] * len(line)
+    whole = [True] * len(line)
+    for first, end in ((True, ends[0]), (False, ends[1])):
+        outer = line[0] if first else line[-1]
+        gap = float(np.linalg.norm(net.points[end] - net.points[outer]))
+        start = s[0] - gap if first else s[-1] + gap
+        more: list[tuple[int, float, Floats, bool]] = []
+        near = IN_PLANE * np.ptp(net.points)
+        # A tow that lies in a plane does not end in it.
+        far = np.abs(net.points[ends]).max(axis=0)
+        plane = [a for a in symmetry if abs(net.points[end, a]) < near < far[a]]
+        if plane:
+            flip = np.where(np.arange(3) == plane[0], -1.0, 1.0)
+            inner = line if first else line[::-1]
+            arc = s if first else s[::-1]
+            images = [(n, 2.0 * start - a) for n, a in zip(inner, arc, strict=True)]
+            beyond = [(n, a, flip, True) for n, a in images if abs(a - start) > 0.0]
+            more = beyond[:REACH]
+        elif gap > 0.0:
+            more = [(end, start, np.ones(3), False)]
+        for n, a, flips, counts in more:
+            index = 0 if first else len(node)
+            node.insert(index, n)
+            at.insert(index, a)
+            sign.insert(index, flips)
+            whole.insert(index, counts)
+    offset = next(k for k, a in enumerate(at) if a == s[0] and node[k] == line[0])
+    stations, arc = np.array(node), np.array(at)
+    signs, counted = np.array(sign), np.array(whole)
+    nodes = np.repeat(line[:, None], 2 * REACH + 1, axis=1)
+    weights = np.zeros((len(line), 2 * REACH + 1, 3))
+    for k in range(len(line)):
+        i = offset + k
+        low, high = i - REACH, i + REACH + 1
+        if low < 0 or high > len(arc) or not counted[low:high].all():
+            low = max(min(i - 1, len(arc) - 3), 0)
+            high = min(low + 3, len(arc))
+        size = high - low
+        nodes[k, :size] = stations[low:high]
+        weights[k, :size] = _slope_weights(arc[low:high] - arc[i])[:, None] * signs[low:high]
+    return nodes, weights
+
+
+def _slope_weights(x: Floats) -> Floats:
+    """Weights of the values at x in the slope at 0 of the polynomial through them."""
+    scale = np.abs(x).max()
+    powers = np.vander(x / scale, increasing=True).T
+    return np.linalg.solve(powers, np.eye(len(x))[1]) / scale
