@@ -17,6 +17,7 @@ from .export import export
 from .fibres import fibres
 from .keys import keys
 from .kinematic import kinematic
+from .map import map
 from .mesh import mesh
 from .new import new
 from .run import run
@@ -63,6 +64,10 @@ EXAMPLES: dict[Callable[..., None], list[str]] = {
     view: ["view results/drape", "view results/drape --html", "view results/drape --time 30"],
     animate: ["animate results/drape", "animate results/drape --out drape.mp4"],
     fibres: ["fibres results/drape", "fibres results/drape --out fibres.vtu"],
+    map: [
+        "map results/drape part.inp --thickness 0.3 --material ply --out mapped.inp",
+        "map results/drape part.stl --out part.vtu",
+    ],
     export: ["export results/drape net.vtk"],
     diagnose: ["diagnose my_fabric", "diagnose frame strip --effects crossover_friction"],
     synthesise: [
