@@ -1,0 +1,136 @@
+"""A drape beside measured angles and outlines, and beside another drape.
+
+Results are given as in the benchmarks of forming: the share of the places at which the angle is
+within 2 and 6 degrees, and the distance of the outlines in mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fabric_fenicsx.fabric.crossings import reference_angle
+from fabric_fenicsx.output.draped import DrapedSheet
+from fabric_fenicsx.output.pattern import to_line
+
+__all__ = ["AngleMap", "compared_angles", "differing_keys", "line_distance", "repeat_scatter"]
+
+Array = npt.NDArray[np.float64]
+
+#: Places of repeated measurements closer than this are the same [mm].
+SAME_PLACE = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AngleMap:
+    """Measured angles and what the drape has at the same places of the fabric.
+
+    Attributes:
+        flat: places on the undeformed sheet [mm], (k, 2), NaN beyond its rim.
+        measured: acute angle between the tows [°], (k,).
+        angle: that of the drape [°], (k,), NaN beyond the rim.
+    """
+
+    flat: Array
+    measured: Array
+    angle: Array
+
+    @property
+    def difference(self) -> Array:
+        """Drape less measurement [°], of the places on the sheet."""
+        gap = self.angle - self.measured
+        return gap[np.isfinite(gap)]
+
+    def numbers(self) -> dict[str, float | int | None]:
+        """Shares within 2 and 6 degrees [%], mean, root mean square and largest difference [°]."""
+        gap = self.difference
+        counts = {"places": len(gap), "places_beyond_the_sheet": len(self.angle) - len(gap)}
+        if not len(gap):
+            return counts
+        return counts | {
+            "within_2_deg_percent": 100.0 * float(np.mean(np.abs(gap) <= 2.0)),
+            "within_6_deg_percent": 100.0 * float(np.mean(np.abs(gap) <= 6.0)),
+            "mean_deg": float(gap.mean()),
+            "rms_deg": float(np.sqrt(np.mean(gap**2))),
+            "largest_deg": float(np.abs(gap).max()),
+        }
+
+
+def acute_angles(sheet: DrapedSheet) -> Array:
+    """Acute angle between the tows at the crossings [°], (n,)."""
+    turned = sheet.snapshot.shear_angle + reference_angle(sheet.net)
+    return np.asarray(90.0 - np.degrees(np.abs(turned)))
+
+
+def compared_angles(sheet: DrapedSheet, table: Mapping[str, Array]) -> AngleMap:
+    """The drape's angles where a table has measured ones.
+
+    Args:
+        sheet: the draped fabric.
+        table: `x_mm`, `y_mm`, `angle_deg`; with `z_mm` the places are of the draped fabric, else of
+            the flat one.
+    """
+    places = np.column_stack([table["x_mm"], table["y_mm"]])
+    if "z_mm" in table:
+        flat, _ = sheet.to_flat(np.column_stack([places, table["z_mm"]]))
+        places = flat[:, :2]
+    inside = np.isfinite(places).all(axis=1)
+    angle = np.full(len(places), np.nan)
+    angle[inside] = sheet.at_flat(places[inside], acute_angles(sheet))
+    return AngleMap(places, np.asarray(table["angle_deg"]), angle)
+
+
+def repeat_scatter(table: Mapping[str, Array]) -> float | None:
+    """Standard deviation of repeats at the same place [°], pooled; None without any.
+
+    From the column `repeat`, else the root mean square of `std_deg`.
+    """
+    if "repeat" in table:
+        names = [name for name in ("x_mm", "y_mm", "z_mm") if name in table]
+        at = np.round(np.column_stack([table[name] for name in names]) / SAME_PLACE)
+        _, group = np.unique(at, axis=0, return_inverse=True)
+        group = group.ravel()
+        count = np.bincount(group)
+        mean = np.bincount(group, table["angle_deg"]) / count
+        freedom = int((count - 1).sum())
+        if freedom:
+            squares = float(((table["angle_deg"] - mean[group]) ** 2).sum())
+            return float(np.sqrt(squares / freedom))
+    if "std_deg" in table:
+        return float(np.sqrt(np.nanmean(table["std_deg"] ** 2)))
+    return None
+
+
+def line_distance(outline: Array, other: Array) -> dict[str, float]:
+    """Distance of the points of an outline from another closed line [mm], both (n, d)."""
+    gap = to_line(outline, other)
+    return {
+        "mean_mm": float(gap.mean()),
+        "rms_mm": float(np.sqrt(np.mean(gap**2))),
+        "largest_mm": float(gap.max()),
+    }
+
+
+def differing_keys(
+    mine: Mapping[str, object], other: Mapping[str, object]
+) -> list[dict[str, object]]:
+    """Keys whose values differ in two cases, as {"key", "this", "other"}; groups by dotted keys."""
+    here, there = dict(_dotted(mine)), dict(_dotted(other))
+    return [
+        {"key": key, "this": here.get(key), "other": there.get(key)}
+        for key in {**here, **there}
+        if here.get(key) != there.get(key) and not key.startswith(("assumptions", "title"))
+    ]
+
+
+def _dotted(keys: Mapping[str, object], above: str = "") -> list[tuple[str, object]]:
+    found: list[tuple[str, object]] = []
+    for key, value in keys.items():
+        if isinstance(value, Mapping):
+            found += _dotted(value, f"{above}{key}.")
+        else:
+            found.append((above + key, value))
+    return found

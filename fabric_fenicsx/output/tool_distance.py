@@ -1,0 +1,65 @@
+"""How far a draped net is from the tools that give it its shape."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyvista as pv
+
+from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
+
+__all__ = ["ToolDistance", "deepest_penetration", "tool_distance"]
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+HOLDING = "holder"
+"""What the name of a tool begins with that presses the fabric on another and gives it no shape."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ToolDistance:
+    """The nearest tool of each of n points.
+
+    Attributes:
+        names: of the tools.
+        nearest: number of the nearest tool, (n,).
+        distance: from it, negative inside it [mm], (n,).
+        feet: nearest point of each tool [mm], (n_tools, n, 3).
+    """
+
+    names: list[str]
+    nearest: Integers
+    distance: Array
+    feet: Array
+
+
+def tool_distance(tools: Sequence[TriangleSurface], points: Array) -> ToolDistance | None:
+    """Distances of points (n, 3) from the tools that shape; None if there is none."""
+    shaping = [tool for tool in tools if not tool.name.startswith(HOLDING)]
+    if not shaping:
+        return None
+    feet, distances = zip(*(_to_tool(tool, points) for tool in shaping), strict=True)
+    signed = np.array(distances)
+    nearest = np.abs(signed).argmin(axis=0)
+    distance = signed[nearest, np.arange(len(points))]
+    return ToolDistance([t.name for t in shaping], nearest, distance, np.array(feet))
+
+
+def deepest_penetration(tools: Sequence[TriangleSurface], points: Array) -> dict[str, float]:
+    """How deep the deepest of the points lies in each tool [mm], 0 if none does."""
+    return {tool.name: float(max(-_to_tool(tool, points)[1].min(), 0.0)) for tool in tools}
+
+
+def _to_tool(tool: TriangleSurface, points: Array) -> tuple[Array, Array]:
+    """Nearest points of a tool, (n, 3), and signed distances [mm], (n,)."""
+    mesh: Any = triangulated(tool)
+    _, feet = mesh.find_closest_cell(points, return_closest_point=True)
+    signed = np.asarray(pv.PolyData(points).compute_implicit_distance(mesh)["implicit_distance"])
+    distance = np.linalg.norm(feet - points, axis=1) * np.where(signed < 0.0, -1.0, 1.0)
+    # The triangles of a picture may face either way; what is far from a rigid tool is outside it.
+    return np.asarray(feet), distance if distance.sum() >= 0.0 else -distance
