@@ -31,6 +31,7 @@ UNITS = {
     "mm_s2": "mm/s²",
     "mm_min": "mm/min",
     "N_mm": "N/mm",
+    "Nmm": "N mm",
     "per_MPa": "1/MPa",
     "MPa": "MPa",
     "deg": "°",

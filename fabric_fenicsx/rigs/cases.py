@@ -20,13 +20,46 @@ from .shear_law_keys import ShearLawKeys
 
 __all__ = [
     "Assumptions",
+    "BundleKeys",
     "Case",
     "CrossoverKeys",
     "PlainWeaveCase",
     "SolverKeys",
+    "StiffnessKeys",
     "TowKeys",
     "TowTypeKeys",
 ]
+
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class BundleKeys(Keys):
+    """Filaments of the real tows, for `section_law: bundle`."""
+
+    filaments: Positive = Field(description="of one tow")
+    filament_diameter_mm: Positive = Field(description="d")
+    filament_modulus_MPa: Positive = Field(description="E along the filament")
+    filament_shear_modulus_MPa: Positive = Field(description="G of the filament")
+    filament_density_kg_mm3: Positive = Field(description="of the filament")
+    tow_width_mm: Positive = Field(description="of one tow in the sheet")
+    tow_height_mm: Positive = Field(description="of one tow across the sheet")
+    tow_spacing_mm: Positive = Field(description="from one tow to the next of its family")
+    coupling_in_plane: Share = Field(
+        description="of bending in the plane: 0 for free filaments, 1 for a bonded bar"
+    )
+    coupling_out_of_plane: Share = Field(description="of bending out of the plane, likewise")
+    coupling_twist: Share = Field(description="of twist, likewise")
+
+
+class StiffnessKeys(Keys):
+    """Stiffnesses of one family of tows per width of fabric; others follow from the section."""
+
+    stretch_N_mm: Positive | None = Field(None, description="E A per width")
+    shear_N_mm: Positive | None = Field(None, description="κ G A across the tow per width")
+    twist_Nmm: Positive | None = Field(None, description="G J per width")
+    bending_out_of_plane_Nmm: Positive | None = Field(None, description="E I out of the sheet")
+    bending_in_plane_Nmm: Positive | None = Field(None, description="E I in the sheet's plane")
 
 
 class TowKeys(Keys):
@@ -37,15 +70,33 @@ class TowKeys(Keys):
     density_kg_mm3: Positive = Field(7.0e-6, description="ρ")
     C1_MPa: Positive = Field(60000.0, description="Neo-Hookean constant; E = 6 C1, G = 2 C1")
     D1_per_MPa: NotNegative = Field(0.0, description="compressibility; 0: incompressible")
-    section_law: Literal["linear", "neo_hookean", "neo_hookean_fibres"] = Field(
+    section_law: Literal["linear", "neo_hookean", "neo_hookean_fibres", "bundle"] = Field(
         "linear",
-        description="linearised at zero strain, or integrated over the section; _fibres: twist "
-        "stretches the fibres of a flat tow off its axis, which shortens it",
+        description="rectangle, linearised at zero strain or integrated over the section; _fibres: "
+        "twist stretches the fibres of a flat tow off its axis, which shortens it; or the filaments"
+        " of `bundle`",
     )
+    per_width_mm: Positive | None = Field(
+        None,
+        description="width of fabric that the rectangle stands for: at another spacing stiffness "
+        "and weight follow the spacing; null: the spacing of the sheet",
+    )
+    stiffness: StiffnessKeys = Field(
+        default_factory=StiffnessKeys, description="in place of what follows from the section"
+    )
+    bundle: BundleKeys | None = Field(None, description="only with section_law: bundle")
     shear_correction: Positive = Field(5.0 / 6.0, description="factor on the shear stiffness")
     relaxation_time_s: NotNegative = Field(
         1.0, description="viscosity of bending and twist as a relaxation time; 0: elastic"
     )
+
+    @model_validator(mode="after")
+    def _one_section(self) -> TowKeys:
+        if (self.section_law == "bundle") != (self.bundle is not None):
+            raise ValueError("bundle: goes with section_law: bundle, and only with it")
+        if self.bundle is not None and self.per_width_mm is not None:
+            raise ValueError("per_width_mm: a bundle has tow_spacing_mm in its place")
+        return self
 
 
 class TowTypeKeys(Keys):
@@ -152,6 +203,12 @@ class Case(Keys):
         description="for keys that no source gives: the reason for the value, by dotted key",
     )
     test: str
+
+    @model_validator(mode="after")
+    def _types_are_rectangles(self) -> Case:
+        if self.tow_types and self.tow.bundle is not None:
+            raise ValueError("tow_types: not with section_law: bundle, allowed are rectangles")
+        return self
 
     @model_validator(mode="after")
     def _assumptions_name_keys(self) -> Case:

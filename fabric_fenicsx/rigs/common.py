@@ -20,7 +20,7 @@ from ..fabric.crossings import tow_numbers
 from ..fabric.gmsh_io import mesh_net, read_msh
 from ..fabric.net import WARP, WEFT, Net
 from ..fabric.paths import TowPaths
-from ..fabric.section import RectangularSection
+from ..fabric.section import BundleSection, FabricSection, RectangularSection, Section
 from ..mechanics.laws.law import CrossingLaw
 from ..output.files import write_text
 from ..parallel import from_root
@@ -28,7 +28,7 @@ from ..solving.model import Model
 from ..solving.parts import CrossoverLaw
 from ..solving.snapshot import Snapshot
 from ..solving.stepping import StepControl
-from .cases import Case, CrossoverKeys, SolverKeys, TowKeys
+from .cases import BundleKeys, Case, CrossoverKeys, SolverKeys, TowKeys
 from .registry import rig
 from .simulation import Run, simulate
 
@@ -44,6 +44,10 @@ __all__ = [
     "tow_sections",
     "write_table",
 ]
+
+
+TONNE = 1e-3
+"""Of a kilogram, in which the keys have densities as the paper's Table 3 does."""
 
 
 @dataclass(slots=True)
@@ -78,41 +82,76 @@ class Session:
         return bool(self.comm.rank == 0)
 
 
-def section(keys: TowKeys) -> RectangularSection:
-    """Section of the tows; kg becomes tonne."""
-    return RectangularSection(
-        width=keys.width_mm,
-        height=keys.height_mm,
-        density=keys.density_kg_mm3 * 1e-3,
-        C1=keys.C1_MPa,
-        D1=keys.D1_per_MPa,
-        shear_correction=keys.shear_correction,
+def section(keys: TowKeys, spacing: float) -> Section:
+    """Section of the tows of a family, which stand for ``spacing`` [mm] of fabric each."""
+    base: Section
+    if keys.bundle is not None:
+        base, base_width = _bundle(keys.bundle, keys.shear_correction), keys.bundle.tow_spacing_mm
+    else:
+        base = RectangularSection(
+            width=keys.width_mm,
+            height=keys.height_mm,
+            density=keys.density_kg_mm3 * TONNE,
+            C1=keys.C1_MPa,
+            D1=keys.D1_per_MPa,
+            shear_correction=keys.shear_correction,
+        )
+        base_width = spacing if keys.per_width_mm is None else keys.per_width_mm
+    own = keys.stiffness
+    given = (
+        own.stretch_N_mm,
+        own.shear_N_mm,
+        own.twist_Nmm,
+        own.bending_out_of_plane_Nmm,
+        own.bending_in_plane_Nmm,
+    )
+    if base_width == spacing and given == (None,) * 5:
+        return base
+    return FabricSection(base, spacing, base_width, given)
+
+
+def _bundle(keys: BundleKeys, shear_correction: float) -> BundleSection:
+    return BundleSection(
+        filaments=keys.filaments,
+        diameter=keys.filament_diameter_mm,
+        modulus=keys.filament_modulus_MPa,
+        shear_modulus=keys.filament_shear_modulus_MPa,
+        density=keys.filament_density_kg_mm3 * TONNE,
+        width=keys.tow_width_mm,
+        height=keys.tow_height_mm,
+        coupling=(keys.coupling_in_plane, keys.coupling_out_of_plane, keys.coupling_twist),
+        shear_correction=shear_correction,
     )
 
 
 def tow_sections(
-    case: Case, net: Net
-) -> tuple[tuple[RectangularSection, ...], npt.NDArray[np.int64]]:
+    case: Case, net: Net, spacings: tuple[float, float]
+) -> tuple[tuple[Section, ...], npt.NDArray[np.int64]]:
     """The sections of a case's tows, and which of them each tow of the net has, (n_tows,).
+
+    Args:
+        case: the case.
+        net: its net.
+        spacings: of the warp and of the weft tows [mm].
 
     Raises:
         InputError: two types claim the same tow.
     """
-    sections = [section(case.tow)]
-    kind = np.zeros(len(net.tow_family), dtype=np.int64)
+    sections = [section(case.tow, spacing) for spacing in spacings]
+    kind = net.tow_family.astype(np.int64)
     if not case.tow_types:
         return tuple(sections), kind
     numbers = tow_numbers(net)
     for i, keys in enumerate(case.tow_types):
         family = WARP if keys.family == "warp" else WEFT
         own = (net.tow_family == family) & np.isin(numbers % keys.repeat, keys.tows)
-        if kind[own].any():
-            number = int(numbers[own & (kind > 0)].min())
+        if (kind[own] > WEFT).any():
+            number = int(numbers[own & (kind > WEFT)].min())
             raise InputError(
                 f"tow_types.{i}: {keys.family} tow {number} has a type already, allowed is one"
             )
         kind[own] = len(sections)
-        sections.append(section(keys.of(case.tow)))
+        sections.append(section(keys.of(case.tow), spacings[family]))
     return tuple(sections), kind
 
 
@@ -143,12 +182,12 @@ def fabric_model(
         session: where and how it runs.
         rig: what the rig adds; further arguments of Model.
     """
-    sections, kind = tow_sections(case, net)
+    sections, kind = tow_sections(case, net, spacings)
     return Model(
         net,
         sections,
         tow_section=kind,
-        section_law=case.tow.section_law,
+        section_law="linear" if case.tow.section_law == "bundle" else case.tow.section_law,
         crossovers=crossover_law(case.crossover, spacings[0] * spacings[1], session.laws),
         comm=session.comm,
         **rig,

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
-from ..fabric.section import RectangularSection, Section
+from ..fabric.section import FabricSection, RectangularSection, Section
 from ..mechanics.neo_hookean import neo_hookean_section
 from ..mechanics.section_laws import LINEAR, PACKED, ElasticSection, coupled_section
 from .discretisation import Discretisation
@@ -46,7 +46,8 @@ def elastic_section(
     mesh = disc.tows.mesh
     if law in ("neo_hookean", "neo_hookean_fibres"):
         fibres = law == "neo_hookean_fibres"
-        rectangles = [s for s in sections if isinstance(s, RectangularSection)]
+        bases = [s.base if isinstance(s, FabricSection) else s for s in sections]
+        rectangles = [s for s in bases if isinstance(s, RectangularSection)]
         if len(rectangles) < len(sections):
             raise ValueError("the Neo-Hookean section law needs rectangular sections")
         d = np.array([[s.compressibility] for s in rectangles])
