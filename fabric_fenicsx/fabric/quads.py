@@ -52,7 +52,8 @@ def rim_faces(net: Net) -> tuple[Integers, Integers, Integers]:
         runs from a crossing along its tow as `meshes` does.
     """
     following, tow = next_crossings(net), _tows(net)
-    ends, before = [], []
+    ends: list[int] = []
+    before: list[int] = []
     faces: list[tuple[int, int, int, int]] = []
     for side in (0, 1):
         nodes = net.crossings[:, side]

@@ -47,7 +47,10 @@ class AngleMap:
     def numbers(self) -> dict[str, float | int | None]:
         """Shares within 2 and 6 degrees [%], mean, root mean square and largest difference [°]."""
         gap = self.difference
-        counts = {"places": len(gap), "places_beyond_the_sheet": len(self.angle) - len(gap)}
+        counts: dict[str, float | int | None] = {
+            "places": len(gap),
+            "places_beyond_the_sheet": len(self.angle) - len(gap),
+        }
         if not len(gap):
             return counts
         return counts | {

@@ -95,7 +95,7 @@ class DrapedSheet:
 
     @cached_property
     def normals(self) -> Array:
-        """Unit normals of the draped surface at the crossings, (n, 3); upwards on the flat sheet."""
+        """Unit normals of the draped surface at the crossings, (n, 3); upwards on a flat sheet."""
         normal = np.cross(self.snapshot.axes[:, 0], self.snapshot.axes[:, 1])
         normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
         # Where the warp lies along y, warp × weft points downwards.
@@ -187,7 +187,7 @@ def locate(corners: Array, places: Array, height: Array | None = None) -> Found:
         gap = away - b[face] * xi - c[face] * eta - d[face] * xi * eta
         tt, ss, ts = (np.einsum("ijk,ijk->ij", p, q) for p, q in ((t, t), (s, s), (t, s)))
         gt, gs = (np.einsum("ijk,ijk->ij", gap, p) for p in (t, s))
-        # A face folded upon itself has no second direction; a little of the trace keeps it solvable.
+        # A face folded upon itself has no second direction: a little of the trace stands in.
         determinant = np.maximum(tt * ss - ts**2, 1e-12 * (tt + ss) ** 2)
         step = np.stack([ss * gt - ts * gs, tt * gs - ts * gt], axis=-1) / determinant[..., None]
         local = np.clip(local + np.clip(step, -1.0, 1.0), -1.0, 2.0)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -98,8 +99,11 @@ def tow_waves(sheet: DrapedSheet, distance: ToolDistance, smallest: float) -> li
     found = []
     for tow, nodes in _tows(sheet.net):
         arc = arc_length(sheet.net.points[nodes])
-        change = np.flatnonzero(np.diff(distance.nearest[nodes])) + 1
+        tool = np.where(np.isfinite(distance.distance[nodes]), distance.nearest[nodes], -1)
+        change = np.flatnonzero(np.diff(tool)) + 1
         for part in np.split(np.arange(len(nodes)), change):
+            if tool[part[0]] < 0:
+                continue
             for k, amplitude, length in waves(arc[part], distance.distance[nodes[part]], smallest):
                 found.append(Wave(tow, int(nodes[part[k]]), amplitude, length))
     return found
@@ -136,7 +140,7 @@ def in_plane_waves(sheet: DrapedSheet) -> tuple[Array, Array]:
         )
         turn = np.concatenate([turn[:1], turn, turn[-1:]]) if len(turn) else np.zeros(2)
         arc = arc_length(net.points[nodes])
-        for k, (first, last) in enumerate(zip(at[:-1], at[1:], strict=True)):
+        for k, (first, last) in enumerate(pairwise(at.tolist())):
             inner = np.arange(first + 1, last)
             if not len(inner):
                 continue
@@ -155,8 +159,8 @@ def in_plane_waves(sheet: DrapedSheet) -> tuple[Array, Array]:
 def buckling_ratio(net: Net, snapshot: Snapshot, stiffness: Array) -> Array:
     """Compression of each cell over Euler's load of its span between crossings.
 
-    −N L²/(π² E I) with both ends of the span free to turn, E I out of the sheet's plane. A tow's end
-    beyond its last crossing counts as such a span of the same length as its neighbour.
+    −N L²/(π² E I) with both ends of the span free to turn, E I out of the sheet's plane. A tow's
+    end beyond its last crossing counts as a span of its neighbour's length.
 
     Args:
         net: the net.
