@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fabric_fenicsx.fabric.crossings import reference_angle
 from fabric_fenicsx.output.draped import DrapedSheet
 from fabric_fenicsx.output.pattern import to_line
 
@@ -63,9 +62,9 @@ class AngleMap:
 
 
 def acute_angles(sheet: DrapedSheet) -> Array:
-    """Acute angle between the tows at the crossings [°], (n,)."""
-    turned = sheet.snapshot.shear_angle + reference_angle(sheet.net)
-    return np.asarray(90.0 - np.degrees(np.abs(turned)))
+    """Acute angle between the tows' axes at the crossings [°], (n,)."""
+    cosine = np.abs(np.einsum("ij,ij->i", *np.moveaxis(sheet.snapshot.axes, 1, 0)))
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0))))
 
 
 def compared_angles(sheet: DrapedSheet, table: Mapping[str, Array]) -> AngleMap:

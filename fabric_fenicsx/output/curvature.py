@@ -3,9 +3,9 @@
 The quadric w = e u + f v + (a u² + 2 b u v + c v²)/2 is fitted to the eight neighbours of a
 crossing in its own frame, u along the warp and w along the normal. With the fundamental forms I and
 II of that quadric the shape operator is S = I⁻¹ II, whose eigenvalues are the principal curvatures
-(do Carmo, Differential Geometry of Curves and Surfaces, 1976, section 3-3). A ball of radius R below
-the fabric has S = −1/R. Maps of curvature show wrinkles of draped fabric: Yu et al., Composites A
-143 (2021) 106308.
+(do Carmo, Differential Geometry of Curves and Surfaces, 1976, section 3-3). A ball of radius R
+below the fabric has S = −1/R. Maps of curvature show wrinkles of draped fabric: Yu et al.,
+Composites A 143 (2021) 106308.
 """
 
 from __future__ import annotations

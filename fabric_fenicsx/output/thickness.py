@@ -2,8 +2,8 @@
 
 Tows keep their length, so shear by γ packs their fibres onto cos γ of the area: the areal density
 of fibres grows by f = 1/cos γ (Prodromou & Chen, Composites A 28, 1997; for other angles between
-the tows see `output.fibres`). Two limits bound what becomes of it: a fabric that is free to thicken,
-t = t0 f at the flat sheet's fibre volume fraction, and one pressed to the flat sheet's thickness,
+the tows see `output.fibres`). Two limits bound what becomes of it: a fabric free to thicken, t =
+t0 f at the flat sheet's fibre volume fraction, and one pressed to the flat sheet's thickness,
 V = V0 f.
 """
 

@@ -28,8 +28,8 @@ class ToolDistance:
     Attributes:
         names: of the tools.
         nearest: number of the nearest tool, (n,).
-        distance: from it, negative inside it [mm], (n,); NaN of points that lie beyond the rims of
-            all tools as they are drawn.
+        distance: from it, negative inside it [mm], (n,); NaN of points that lie beyond the rim of
+            that tool as it is drawn.
         feet: nearest point of each tool [mm], (n_tools, n, 3).
     """
 
@@ -46,7 +46,7 @@ def tool_distance(tools: Sequence[TriangleSurface], points: Array) -> ToolDistan
         return None
     feet, distances = zip(*(_to_tool(tool, points) for tool in shaping), strict=True)
     signed = np.array(distances)
-    nearest = np.where(np.isnan(signed), np.inf, np.abs(signed)).argmin(axis=0)
+    nearest = np.linalg.norm(np.array(feet) - points, axis=-1).argmin(axis=0)
     distance = signed[nearest, np.arange(len(points))]
     return ToolDistance([t.name for t in shaping], nearest, distance, np.array(feet))
 

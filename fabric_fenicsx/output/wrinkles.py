@@ -47,18 +47,16 @@ class Wave:
 def turning_points(height: Array, fall: float) -> list[int]:
     """Indices of the highest and lowest values in turn; each reversal is at least ``fall``."""
     found: list[int] = []
-    high = low = 0
+    high = low = sense = 0
     for k, value in enumerate(height):
         high = k if value > height[high] else high
         low = k if value < height[low] else low
-        if height[high] - value >= fall and (not found or found[-1] != high) and high >= low:
+        if sense >= 0 and height[high] - value >= fall:
             found.append(high)
-            low = k
-            high = k
-        elif value - height[low] >= fall and (not found or found[-1] != low) and low >= high:
+            sense, low = -1, k
+        elif sense <= 0 and value - height[low] >= fall:
             found.append(low)
-            high = k
-            low = k
+            sense, high = 1, k
     return found
 
 
