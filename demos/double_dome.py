@@ -27,12 +27,17 @@ MESHES = Path(__file__).parents[1] / "meshes"
 # %% [markdown]
 # ## The fabric
 #
-# As in `drape.py`, on tows 8 mm apart: two thirds of the section's width for each of them, and the
-# same assumed moments per area.
+# As in `drape.py`, on tows 8 mm apart: the same stiffness per width, the same assumed moments per
+# area.
 
 # %%
 SPACING = 8.0
-SECTION = ff.RectangularSection(width=3.05, height=0.04, density=7e-9, C1=60000.0)
+SECTION = ff.FabricSection(
+    ff.RectangularSection(width=4.57, height=0.04, density=7e-9, C1=60000.0),
+    width=SPACING,
+    base_width=12.0,
+    per_width=(None, None, None, None, 9.5),
+)
 AREA = SPACING**2
 CROSSINGS = ff.CrossoverLaw(
     translation=100.0, k1=0.02 * AREA, k3=0.08 * AREA, dashpot=2.0 * AREA, alignment=450.0
@@ -103,6 +108,7 @@ def main(
         tools=tools,
         contact_law=ff.ContactLaw(stiffness=0.5, layer=0.5),
         supports=ff.symmetry_planes(net),
+        symmetry=(0, 1),
     )
     run = ff.simulate(
         model,

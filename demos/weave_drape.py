@@ -20,13 +20,13 @@ import pandas as pd
 import fabric_fenicsx as ff
 
 # %% [markdown]
-# The sheet of `demos/drape.yaml` with half as many tows. Each is as wide as two of those, so that
-# the sheet keeps its weight and its stiffness against bending out of its plane.
+# The fabric of `demos/drape.yaml` with a quarter as many tows: `per_width_mm` keeps weight and
+# stiffness per width.
 
 # %%
 KEYS = {
     "sheet": {"warp_spacing_mm": 24.0, "weft_spacing_mm": 24.0},
-    "tow": {"width_mm": 9.14},
+    "tow": {"per_width_mm": 12.0, "stiffness": {"bending_in_plane_Nmm": 9.5}},
 }
 NAMES = ("plain", "twill_2_2", "satin_8")
 

@@ -15,7 +15,9 @@ from .fabric.outline import Circle as Circle
 from .fabric.outline import Outline as Outline
 from .fabric.outline import Polygon as Polygon
 from .fabric.outline import rectangle as rectangle
+from .fabric.section import BundleSection as BundleSection
 from .fabric.section import CoupledSection as CoupledSection
+from .fabric.section import FabricSection as FabricSection
 from .fabric.section import RectangularSection as RectangularSection
 from .fabric.sheet import Sheet as Sheet
 from .fabric.sheet import centred_sheet as centred_sheet

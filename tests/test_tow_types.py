@@ -36,7 +36,7 @@ def test_each_tow_carries_what_its_section_does():
     The warp only follows. From y = 0 on the six wefts are of the types 0, 1, 2, 0, 1, 2.
     """
     case, net = case_and_net(TYPES)
-    sections, kind = tow_sections(case, net)
+    sections, kind = tow_sections(case, net, case.spacings)
     stretch, length = 1e-3, 48.0
     wefts = np.flatnonzero(net.tow_family == WEFT)
     left, right = net.ends[wefts].T
@@ -60,14 +60,14 @@ def test_each_tow_carries_what_its_section_does():
     assert len(wefts) == 6
     assert pulled == pytest.approx(exact, rel=1e-9)
     mass = np.array([s.mass()[0] for s in sections])
-    assert mass / (4.57 * 0.04) == pytest.approx([7e-9, 7e-9, 1e-9 * 2.0 / 4.57])
+    assert mass / (4.57 * 0.04) == pytest.approx([7e-9, 7e-9, 7e-9, 1e-9 * 2.0 / 4.57])
 
 
 def test_two_types_for_one_tow_are_refused():
     twice = [*TYPES, {"family": "weft", "repeat": 2, "tows": [0], "width_mm": 3.0}]
     case, net = case_and_net(twice)
     with pytest.raises(InputError, match=r"tow_types\.2: weft tow 2 has a type already"):
-        tow_sections(case, net)
+        tow_sections(case, net, case.spacings)
 
 
 def test_a_tow_beyond_the_repeat_is_refused(tmp_path):

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..fabric.net import Net
     from ..rigs.cases import Case
 
@@ -41,6 +43,7 @@ def check(
         counts = (len(net.tow_family), len(net.crossings), len(net.points), len(net.cells))
         table.add_row(name, *map(str, counts), str(6 * len(net.points)))
     console.print(table)
+    _print_stiffness(loaded, console)
     cost = estimate(loaded, list(nets.values()))
     if cost is None:
         console.print(f"no estimate of steps and time: {loaded.test} gives no figures for one")
@@ -51,6 +54,25 @@ def check(
         "up to a minute more.",
         soft_wrap=True,
     )
+
+
+def _print_stiffness(case: Case, console: Console) -> None:
+    """What a millimetre of the fabric's width resists with and weighs, if the rig has spacings."""
+    from rich.table import Table
+
+    from ..rigs.common import KG_M2, section
+
+    spacings = getattr(case, "spacings", None)
+    if spacings is None:
+        return
+    columns = ("stretch N/mm", "shear N/mm", "twist N mm", "bending N mm", "in plane N mm", "kg/m²")
+    table = Table("per width", *columns)
+    for name, spacing in zip(("warp", "weft"), spacings, strict=True):
+        tow = section(case.tow, spacing)
+        stretch, shear, _, *turns = tow.stiffness() / spacing
+        weight = tow.mass()[0] / spacing * KG_M2
+        table.add_row(name, *(f"{value:.4g}" for value in (stretch, shear, *turns, weight)))
+    console.print(table)
 
 
 def _nets(case: Case, base: Path) -> dict[str, Net]:

@@ -81,8 +81,8 @@ class TowKeys(Keys):
         description="width of fabric that the rectangle stands for: at another spacing stiffness "
         "and weight follow the spacing; null: the spacing of the sheet",
     )
-    stiffness: StiffnessKeys = Field(
-        default_factory=StiffnessKeys, description="in place of what follows from the section"
+    stiffness: StiffnessKeys | None = Field(
+        None, description="in place of what follows from the section"
     )
     bundle: BundleKeys | None = Field(None, description="only with section_law: bundle")
     shear_correction: Positive = Field(5.0 / 6.0, description="factor on the shear stiffness")

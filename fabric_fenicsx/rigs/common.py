@@ -28,7 +28,7 @@ from ..solving.model import Model
 from ..solving.parts import CrossoverLaw
 from ..solving.snapshot import Snapshot
 from ..solving.stepping import StepControl
-from .cases import BundleKeys, Case, CrossoverKeys, SolverKeys, TowKeys
+from .cases import BundleKeys, Case, CrossoverKeys, SolverKeys, StiffnessKeys, TowKeys
 from .registry import rig
 from .simulation import Run, simulate
 
@@ -48,6 +48,9 @@ __all__ = [
 
 TONNE = 1e-3
 """Of a kilogram, in which the keys have densities as the paper's Table 3 does."""
+
+KG_M2 = 1e9
+"""Of a tonne per mm²."""
 
 
 @dataclass(slots=True)
@@ -97,7 +100,7 @@ def section(keys: TowKeys, spacing: float) -> Section:
             shear_correction=keys.shear_correction,
         )
         base_width = spacing if keys.per_width_mm is None else keys.per_width_mm
-    own = keys.stiffness
+    own = keys.stiffness or StiffnessKeys()
     given = (
         own.stretch_N_mm,
         own.shear_N_mm,

@@ -105,6 +105,11 @@ class DrapeCase(Case):
     contact: ContactKeys = Field(default_factory=ContactKeys, description="tows on tools")
     points: list[PointKeys] = Field(default_factory=list, description="where angles are compared")
 
+    @property
+    def spacings(self) -> tuple[float, float]:
+        """Of the warp and of the weft tows [mm]."""
+        return self.sheet.warp_spacing_mm, self.sheet.weft_spacing_mm
+
     @model_validator(mode="after")
     def _fits(self) -> DrapeCase:
         if self.holder_force_N is not None and "holder_gap_mm" in self.model_fields_set:
@@ -240,7 +245,7 @@ def build(case: DrapeCase, session: Session) -> Model:
     return fabric_model(
         case,
         net,
-        (keys.warp_spacing_mm, keys.weft_spacing_mm),
+        case.spacings,
         session,
         gravity=(0.0, 0.0, -case.gravity_mm_s2),
         inertia=GeneralisedAlpha(case.solver.spectral_radius),
