@@ -68,42 +68,48 @@ def acute_angles(sheet: DrapedSheet) -> Array:
 
 
 def compared_angles(sheet: DrapedSheet, table: Mapping[str, Array]) -> AngleMap:
-    """The drape's angles where a table has measured ones.
+    """The drape's angles where a table has measured ones; of repeats at one place, their mean.
 
     Args:
         sheet: the draped fabric.
         table: `x_mm`, `y_mm`, `angle_deg`; with `z_mm` the places are of the draped fabric, else of
             the flat one.
     """
-    places = np.column_stack([table["x_mm"], table["y_mm"]])
-    if "z_mm" in table:
-        flat, _ = sheet.to_flat(np.column_stack([places, table["z_mm"]]))
-        places = flat[:, :2]
+    places, group, count = _places(table)
+    measured = np.bincount(group, table["angle_deg"]) / count
+    if places.shape[1] == 3:
+        places = sheet.to_flat(places)[0][:, :2]
     inside = np.isfinite(places).all(axis=1)
     angle = np.full(len(places), np.nan)
     angle[inside] = sheet.at_flat(places[inside], acute_angles(sheet))
-    return AngleMap(places, np.asarray(table["angle_deg"]), angle)
+    return AngleMap(places, measured, angle)
 
 
 def repeat_scatter(table: Mapping[str, Array]) -> float | None:
     """Standard deviation of repeats at the same place [°], pooled; None without any.
 
-    From the column `repeat`, else the root mean square of `std_deg`.
+    From readings at the same place, else the root mean square of `std_deg`.
     """
-    if "repeat" in table:
-        names = [name for name in ("x_mm", "y_mm", "z_mm") if name in table]
-        at = np.round(np.column_stack([table[name] for name in names]) / SAME_PLACE)
-        _, group = np.unique(at, axis=0, return_inverse=True)
-        group = group.ravel()
-        count = np.bincount(group)
+    if "angle_deg" in table:
+        _, group, count = _places(table)
         mean = np.bincount(group, table["angle_deg"]) / count
         freedom = int((count - 1).sum())
         if freedom:
             squares = float(((table["angle_deg"] - mean[group]) ** 2).sum())
             return float(np.sqrt(squares / freedom))
-    if "std_deg" in table:
-        return float(np.sqrt(np.nanmean(table["std_deg"] ** 2)))
-    return None
+    known = table.get("std_deg", np.zeros(0))
+    known = known[np.isfinite(known)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else None
+
+
+def _places(table: Mapping[str, Array]) -> tuple[Array, npt.NDArray[np.int64], Array]:
+    """Places (k, d), to which of them each reading belongs, and how many readings each has."""
+    at = np.column_stack([table[name] for name in ("x_mm", "y_mm", "z_mm") if name in table])
+    _, first, group = np.unique(
+        np.round(at / SAME_PLACE), axis=0, return_index=True, return_inverse=True
+    )
+    group = group.ravel()
+    return at[first], group, np.bincount(group).astype(np.float64)
 
 
 def line_distance(outline: Array, other: Array) -> dict[str, float]:

@@ -110,7 +110,8 @@ def wrinkle_figure(a: Analysis) -> Pair:
         scale(figure, drawn, load, "−N over π² E I/L² [-]", beyond=True)
     return figure, (
         "Circles: crests and troughs of tows that wave across the sheet. Grey: not known, as along "
-        "the rim. A wrinkle shows in several of these maps at one place."
+        "the rim and beyond the tools as they are drawn. A wrinkle shows in several of these maps "
+        "at one place."
     )
 
 
