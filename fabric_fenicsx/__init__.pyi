@@ -25,6 +25,14 @@ from .fabric.sheet import spaced_sheet as spaced_sheet
 from .fabric.weave import WEAVES as WEAVES
 from .fabric.weave import WeavePattern as WeavePattern
 from .fabric.weave import pattern_from_file as pattern_from_file
+from .geometry.formed import FormedHemisphere as FormedHemisphere
+from .geometry.formed import FormedSurface as FormedSurface
+from .geometry.formed_mould import FormedMould as FormedMould
+from .geometry.formed_mould import round_die as round_die
+from .geometry.kinematic_net import KinematicNet as KinematicNet
+from .geometry.kinematic_net import net_on_surface as net_on_surface
+from .geometry.triangles import Triangles as Triangles
+from .geometry.triangles import read_stl as read_stl
 from .inputs.parameters import Parameter as Parameter
 from .loop.diagnose import Found as Found
 from .loop.diagnose import diagnose as diagnose
@@ -52,6 +60,7 @@ from .mechanics.terms import work_term as work_term
 from .mechanics.tools import HoledPlate as HoledPlate
 from .mechanics.tools import Mould as Mould
 from .mechanics.tools import Sphere as Sphere
+from .output.kinematic import draw_kinematic as draw_kinematic
 from .output.pictures import draw_net as draw_net
 from .output.results import read_results as read_results
 from .output.surfaces import RevolvedSurface as RevolvedSurface
@@ -59,6 +68,7 @@ from .output.surfaces import TriangleSurface as TriangleSurface
 from .output.weaves import draw_weave as draw_weave
 from .rigs.common import mesh as mesh
 from .rigs.drape import symmetry_planes as symmetry_planes
+from .rigs.kinematic import kinematic_net as kinematic_net
 from .rigs.load import load_case as load_case
 from .rigs.report import report as report
 from .rigs.run import make_case as make_case

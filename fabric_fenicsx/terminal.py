@@ -14,17 +14,25 @@ from rich.table import Table
 
 from .inputs.keys import unit
 
-__all__ = ["counting", "following", "searching", "summarise", "summarise_diagnosis"]
+__all__ = [
+    "counting",
+    "following",
+    "searching",
+    "show_quantities",
+    "summarise",
+    "summarise_diagnosis",
+]
 
 COMPILING = "compiling forms, about a minute on a first run"
 
 HEADINGS = {
-    "x_mm": "x [mm]",
-    "y_mm": "y [mm]",
+    "x_mm": "x \\[mm]",
+    "y_mm": "y \\[mm]",
     "measured_deg": "measured [°]",
     "std_deg": "± [°]",
     "paper_deg": "paper [°]",
     "angle_deg": "this run [°]",
+    "kinematic_deg": "kinematic net [°]",
 }
 
 
@@ -163,7 +171,11 @@ def summarise(result: dict[str, Any], folder: Any) -> None:
         f"{seconds:.1f} s; results in {folder}",
         soft_wrap=True,
     )
-    quantities: dict[str, Any] = result.get("quantities", {})
+    show_quantities(console, result.get("quantities", {}))
+
+
+def show_quantities(console: Console, quantities: dict[str, Any]) -> None:
+    """Print quantities, and lists of them as tables of their own."""
     table = Table("quantity", "value", "unit")
     for name, value in quantities.items():
         if isinstance(value, (int, float, str)):

@@ -116,6 +116,8 @@ def test_run_writes_its_results(completed):
     assert result["ranks"] == 1
     (point,) = result["quantities"]["points"]
     assert 45.0 < point["angle_deg"] <= 90.0
+    # The kinematic net's beside it: at so small a depth both are next to unsheared.
+    assert point["kinematic_deg"] == pytest.approx(point["angle_deg"], abs=0.5)
     assert len(list((folder / "steps").glob("step_*.npz"))) == result["steps"]
     with (folder / "crossings.csv").open(newline="") as file:
         rows = list(csv.reader(file))

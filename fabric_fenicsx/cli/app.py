@@ -16,6 +16,7 @@ from .doctor import doctor
 from .export import export
 from .fibres import fibres
 from .keys import keys
+from .kinematic import kinematic
 from .mesh import mesh
 from .new import new
 from .report import report
@@ -55,6 +56,10 @@ EXAMPLES: dict[Callable[..., None], list[str]] = {
     new: ["new drape", "new picture_frame mine.yaml"],
     check: ["check demos/drape.yaml", "check demos/drape.yaml --set sheet.subdivisions=4"],
     keys: ["keys drape", "keys --markdown > keys.md"],
+    kinematic: [
+        "kinematic demos/drape.yaml",
+        "kinematic demos/drape.yaml --set punch_travel_mm=40",
+    ],
     mesh: ["mesh demos/drape.yaml --out sheet.msh"],
     view: ["view results/drape", "view results/drape --html", "view results/drape --time 30"],
     animate: ["animate results/drape", "animate results/drape --out drape.mp4"],

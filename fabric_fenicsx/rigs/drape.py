@@ -335,16 +335,19 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             "largest_shear_angle_deg": row["largest_shear_deg"],
             "lowest_point_mm": lowest(net, snapshot.displacement),
             "kinetic_over_stored_energy": _kinetic_share(outcome.rows),
-            "points": _points(case, net, snapshot),
+            "points": _points(case, session, net, outcome),
         }
         if session.root and session.pictures:
             _draw(case, session, model, snapshot)
     return extend(outcome.summary, quantities, session)
 
 
-def _points(case: DrapeCase, net: Net, snapshot: Snapshot) -> list[dict[str, Any]]:
+def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[dict[str, Any]]:
     """The case's points with the acute angle there, as a protractor on a photograph gives it."""
-    if not case.points:
+    from .kinematic import known_angles
+
+    snapshot = outcome.last
+    if not case.points or snapshot is None:
         return []
     places = np.array([[p.x_mm, p.y_mm] for p in case.points])
     quarter = case.symmetry == "quarter"
@@ -355,14 +358,16 @@ def _points(case: DrapeCase, net: Net, snapshot: Snapshot) -> list[dict[str, Any
             reference_angle(net) + snapshot.director_turn,
         )
     )
+    known = known_angles(case, session.base) if outcome.completed else [None] * len(places)
     return [
         {
             **point.model_dump(exclude_none=True),
             "angle_deg": round(90.0 - abs(float(shear)), 3),
             "shear_deg": round(float(shear), 3),
             "director_turn_deg": round(float(turn), 3),
+            **({} if kinematic is None else {"kinematic_deg": kinematic}),
         }
-        for point, shear, turn in zip(case.points, axes, directors, strict=True)
+        for point, shear, turn, kinematic in zip(case.points, axes, directors, known, strict=True)
     ]
 
 

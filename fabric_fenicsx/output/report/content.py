@@ -66,12 +66,15 @@ def _run(drape: Drape, a: Analysis) -> dict[str, Any]:
 
 
 def _shear(a: Analysis) -> dict[str, Any]:
-    most = int(a.shear.argmax())
+    most, snapshot = int(a.shear.argmax()), a.drape.sheet.snapshot
     numbers: dict[str, Any] = {
         "largest_deg": a.shear[most],
         "at": _place(a, most),
         "percentile_50_90_99_deg": np.percentile(a.shear, [50, 90, 99]).tolist(),
         "locking_deg": a.locking,
+        "directors_off_by_deg": math.degrees(
+            float(np.abs(snapshot.director_turn - snapshot.shear_angle).max())
+        ),
     }
     if a.locking is not None:
         numbers |= {
