@@ -29,6 +29,8 @@ from fabric_fenicsx.output.pattern import (
     circle,
     to_line,
 )
+from fabric_fenicsx.output.report.analysis import Drape, Settings, analysed
+from fabric_fenicsx.output.report.content import content
 from fabric_fenicsx.output.results import write_setup
 from fabric_fenicsx.output.surfaces import RevolvedSurface
 from fabric_fenicsx.output.thickness import flat_fabric
@@ -49,6 +51,17 @@ def test_flat_fabric_from_what_is_known():
         fibre_fraction=0.5, areal_weight=200.0, fibre_density=2.0
     ).thickness == pytest.approx(0.2)
     assert flat_fabric(areal_weight=200.0).thickness is None
+
+
+def test_density_of_a_sheet_in_pure_shear():
+    gamma = np.radians(40.0)
+    drape = Drape(Path(), "", laid(NET, pure_shear(gamma)), [], 1.0, pd.DataFrame())
+    found = analysed(drape, Settings(locking=35.0, thickness=0.2))
+    assert found.density == pytest.approx(1.0 / np.cos(gamma))
+    numbers = content(found)
+    assert numbers["shear"]["smallest_margin_deg"] == pytest.approx(-5.0)
+    assert numbers["shear"]["beyond_locking_percent"] == 100.0
+    assert numbers["thickness"]["thickness_mm"] == pytest.approx([0.2 / np.cos(gamma)] * 3)
 
 
 # Comparisons.

@@ -178,7 +178,7 @@ def analysed(drape: Drape, settings: Settings) -> Analysis:
         tool = every[gap.nearest, np.arange(sheet.count)]
         hollow = _hollow(sheet, gap, tool)
     reference = reference_angle(sheet.net)
-    turned = reference + sheet.snapshot.shear_angle
+    closing = np.cos(reference + sheet.snapshot.shear_angle) / np.cos(reference)
     measured = None
     if settings.measured is not None:
         angles = compared_angles(sheet, settings.measured)
@@ -197,7 +197,7 @@ def analysed(drape: Drape, settings: Settings) -> Analysis:
         waves=[] if node_gap is None else tow_waves(sheet, node_gap, drape.layer),
         ripple=ripple,
         ripple_span=span,
-        density=np.cos(reference) / np.maximum(np.cos(turned), 1e-9),
+        density=1.0 / np.maximum(closing, 1e-9),  # tows one upon the other would be at 0
         outline=draw_in(sheet),
         pattern=None if settings.trim is None else flat_pattern(sheet, settings.trim),
         measured=measured,
