@@ -218,11 +218,11 @@ def test_health_and_what_is_missing_are_said(run_folder, tmp_path):
     result = run_folder / "result.json"
     before = result.read_text()
     try:
-        health = {"warnings": ["a tow stands on edge"]}
+        health = {"tilt_rms_deg": 12.5, "warnings": ["a tow stands on edge"]}
         result.write_text(json.dumps({"completed": True, "health": health}))
         assert command("report", run_folder, "--out", tmp_path / "a") == 0
         text = (tmp_path / "a" / "report.html").read_text(encoding="utf-8")
-        assert "a tow stands on edge" in text and "The run completed" in text
+        assert "a tow stands on edge" in text and ">12.5<" in text and "The run completed" in text
         assert "no locking angle is known" in text
         result.unlink()
         assert command("report", run_folder, "--out", tmp_path / "b") == 0

@@ -51,6 +51,9 @@ def report(
     fibre_density_g_cm3: Annotated[
         float | None, typer.Option("--fibre-density-g-cm3", help="Of the fibres.")
     ] = None,
+    smallest_mm: Annotated[
+        float, typer.Option("--smallest-mm", help="Waves and gaps that are told.")
+    ] = 0.5,
     out: Annotated[
         File, typer.Option("--out", metavar="FOLDER", help="Default: report in RESULTS.")
     ] = None,
@@ -79,5 +82,6 @@ def report(
         measured=measured,
         measured_outline=measured_outline,
         against=against,
+        smallest_mm=smallest_mm,
     )
     print(target / "report.html")

@@ -57,6 +57,7 @@ def report(
     measured: Path | str | None = None,
     measured_outline: Path | str | None = None,
     against: Path | str | None = None,
+    smallest_mm: float = 0.5,
 ) -> dict[str, Any]:
     """Write the page on a drape: report.html, report.json, the flat pattern and figures.
 
@@ -77,6 +78,7 @@ def report(
             one; angle_deg; std_deg and repeat if there are.
         measured_outline: CSV of the measured draped outline: x_mm, y_mm, and z_mm if there is.
         against: folder of another run of a drape.
+        smallest_mm: amplitude of a wave across the sheet, and gap to a tool, that is told.
 
     Returns:
         The content of report.json.
@@ -91,6 +93,7 @@ def report(
         ("fibre_volume_fraction", fibre_volume_fraction),
         ("areal_weight_g_m2", areal_weight_g_m2),
         ("fibre_density_g_cm3", fibre_density_g_cm3),
+        ("smallest_mm", smallest_mm),
     ):
         top = 1.0 if name == "fibre_volume_fraction" else 90.0 if name == "locking_deg" else np.inf
         if value is not None and not 0.0 < value < top:
@@ -109,6 +112,7 @@ def report(
         measured=None if measured is None else read_table(Path(measured), ANGLES, 1),
         measured_outline=None if measured_outline is None else _line(Path(measured_outline)),
         against=None if against is None else _read(Path(against), time, mirror),
+        smallest=smallest_mm,
     )
     return write_page(folder / "report" if out is None else Path(out), analysed(drape, settings))
 

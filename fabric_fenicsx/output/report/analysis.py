@@ -44,7 +44,7 @@ class Drape:
         result: result.json; None where it is not there, as after a kill.
         case: its keys as plain data; None where it is not there.
         locking: locking angle of a law of the case [°]; None without one.
-        layer: over which contact builds up [mm].
+        layer: over which contact builds up [mm]; None where the case is not there.
         compression: of each cell over Euler's load of its span, (n_cells,); None where the
             stiffness of the tows is not known.
         areal_weight: of the flat fabric [g/m²]; None where it is not known.
@@ -62,7 +62,7 @@ class Drape:
     result: Mapping[str, Any] | None = None
     case: Mapping[str, Any] | None = None
     locking: float | None = None
-    layer: float = 0.5
+    layer: float | None = None
     compression: Array | None = None
     areal_weight: float | None = None
     edge_radius: float | None = None
@@ -84,6 +84,7 @@ class Settings:
         measured: columns of a measured map.
         measured_outline: points of a measured outline [mm], (n, 2) in plan or (n, 3).
         against: another drape.
+        smallest: amplitude of a wave across the sheet, and gap to a tool, that is told [mm].
     """
 
     trim: Array | None = None
@@ -96,6 +97,7 @@ class Settings:
     measured: Mapping[str, Array] | None = None
     measured_outline: Array | None = None
     against: Drape | None = None
+    smallest: float = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,7 +196,7 @@ def analysed(drape: Drape, settings: Settings) -> Analysis:
         penetration=deepest_penetration(drape.tools, nodes),
         curvature=np.abs(excess_curvature(fabric, tool)),
         hollow=hollow,
-        waves=[] if node_gap is None else tow_waves(sheet, node_gap, drape.layer),
+        waves=[] if node_gap is None else tow_waves(sheet, node_gap, settings.smallest),
         ripple=ripple,
         ripple_span=span,
         density=1.0 / np.maximum(closing, 1e-9),  # tows one upon the other would be at 0

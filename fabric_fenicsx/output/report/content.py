@@ -104,7 +104,7 @@ def _wrinkles(a: Analysis) -> dict[str, Any]:
         "out_of_plane": None
         if a.node_gap is None
         else {
-            "smallest_amplitude_mm": a.drape.layer,
+            "smallest_amplitude_mm": a.settings.smallest,
             "tows": len({wave.tow for wave in a.waves}),
             "largest": [
                 {
@@ -136,19 +136,19 @@ def _wrinkles(a: Analysis) -> dict[str, Any]:
 def _touching(a: Analysis) -> npt.NDArray[np.bool_]:
     if a.gap is None:
         return np.zeros(a.drape.sheet.count, dtype=bool)
-    return np.asarray(a.gap.distance < a.drape.layer)
+    return np.asarray(a.gap.distance < a.settings.smallest)
 
 
 def _bridging(a: Analysis) -> dict[str, Any] | None:
     if a.gap is None:
         return None
     gap = a.gap.distance
-    spanned = np.where(a.hollow & (gap > a.drape.layer), gap, -np.inf)
+    spanned = np.where(a.hollow & (gap > a.settings.smallest), gap, -np.inf)
     order = np.argsort(-spanned)[:FEW]
     off = np.where(a.hollow | np.isnan(gap), -np.inf, gap)
     far = int(off.argmax())
     return {
-        "smallest_gap_mm": a.drape.layer,
+        "smallest_gap_mm": a.settings.smallest,
         "crossings": int(np.isfinite(spanned).sum()),
         "largest": [
             {"gap_mm": gap[k], "tool": a.gap.names[a.gap.nearest[k]], "at": _place(a, k)}

@@ -80,7 +80,7 @@ def wrinkle_figure(a: Analysis) -> Pair:
     gap, bent, ripple, load = panels.flat
     empty_map(gap, "distance from the tool, draped")
     if a.gap is not None:
-        most = _round_up(max(float(np.nanmax(np.abs(a.gap.distance))), a.drape.layer))
+        most = _round_up(max(float(np.nanmax(np.abs(a.gap.distance))), a.settings.smallest))
         drawn = coloured(
             gap, sheet, a.gap.distance, flat=False, limits=(-most, most), colours=DIVERGING
         )
@@ -131,12 +131,12 @@ def bridging_figure(a: Analysis) -> Pair:
     sheet, gap = a.drape.sheet, np.maximum(a.gap.distance, 0.0)
     figure = new_figure(4.4)
     panels = figure.subplots(1, 2)
-    limits = 0.0, _round_up(max(float(np.nanmax(gap)), a.drape.layer))
+    limits = 0.0, _round_up(max(float(np.nanmax(gap)), a.settings.smallest))
     for axes, flat, title in zip(panels, (False, True), ("draped", "flat sheet"), strict=True):
         empty_map(axes, f"gap to the tool, {title}")
         drawn = coloured(axes, sheet, gap, flat=flat, limits=limits)
         at = (sheet.flat if flat else sheet.place)[: sheet.count]
-        spanned = a.hollow & (gap > a.drape.layer)
+        spanned = a.hollow & (gap > a.settings.smallest)
         axes.plot(*at[spanned, :2].T, "x", color=WARM, markersize=5)
     scale(figure, drawn, panels, "gap [mm]")
     return figure, "Crosses: the fabric spans a hollow of the tool."
