@@ -77,6 +77,7 @@ from .rigs.common import mesh as mesh
 from .rigs.drape import symmetry_planes as symmetry_planes
 from .rigs.kinematic import kinematic_net as kinematic_net
 from .rigs.load import load_case as load_case
+from .rigs.report import report as report
 from .rigs.run import make_case as make_case
 from .rigs.run import run as run
 from .rigs.simulation import simulate as simulate
