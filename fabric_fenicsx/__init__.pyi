@@ -33,7 +33,9 @@ from .geometry.kinematic_net import KinematicNet as KinematicNet
 from .geometry.kinematic_net import net_on_surface as net_on_surface
 from .geometry.triangles import Triangles as Triangles
 from .geometry.triangles import read_stl as read_stl
+from .inputs.deck import read_deck as read_deck
 from .inputs.parameters import Parameter as Parameter
+from .inputs.shell_mesh import ShellMesh as ShellMesh
 from .loop.diagnose import Found as Found
 from .loop.diagnose import diagnose as diagnose
 from .loop.diagnose import read_measurement as read_measurement
@@ -60,9 +62,14 @@ from .mechanics.terms import work_term as work_term
 from .mechanics.tools import HoledPlate as HoledPlate
 from .mechanics.tools import Mould as Mould
 from .mechanics.tools import Sphere as Sphere
+from .output.fibres import FibreMap as FibreMap
+from .output.fibres import fibre_map as fibre_map
 from .output.kinematic import draw_kinematic as draw_kinematic
 from .output.pictures import draw_net as draw_net
 from .output.results import read_results as read_results
+from .output.shells import Placement as Placement
+from .output.shells import ShellFibres as ShellFibres
+from .output.shells import on_shells as on_shells
 from .output.surfaces import RevolvedSurface as RevolvedSurface
 from .output.surfaces import TriangleSurface as TriangleSurface
 from .output.weaves import draw_weave as draw_weave
@@ -70,6 +77,7 @@ from .rigs.common import mesh as mesh
 from .rigs.drape import symmetry_planes as symmetry_planes
 from .rigs.kinematic import kinematic_net as kinematic_net
 from .rigs.load import load_case as load_case
+from .rigs.report import report as report
 from .rigs.run import make_case as make_case
 from .rigs.run import run as run
 from .rigs.simulation import simulate as simulate

@@ -35,6 +35,9 @@ HEADINGS = {
     "kinematic_deg": "kinematic net [°]",
 }
 
+UNSHOWN = ("shear_deg", "director_turn_deg")
+"""Of a drape's points, in result.json only: a table has no room for them."""
+
 
 class Following:
     """Tells of steps on stderr: a bar on a terminal, else only of a first compilation."""
@@ -192,7 +195,7 @@ def _rows(name: str, rows: list[dict[str, Any]]) -> Table:
     columns = [
         key
         for key in dict.fromkeys(key for row in rows for key in row)
-        if all(not isinstance(row.get(key), (list, dict)) for row in rows)
+        if key not in UNSHOWN and all(not isinstance(row.get(key), (list, dict)) for row in rows)
     ]
     titles = [HEADINGS.get(key) or _heading(key) for key in columns]
     table = Table(*titles, title=name, title_justify="left")
