@@ -80,7 +80,12 @@ class DrapeCase(Case):
         "downwards with its lowest point first",
     )
     punch_cell_mm: Positive = Field(
-        1.0, description="grid of the distance from that punch; its edges are rounded over a cell"
+        1.0, description="grid of the distance from tools of files; edges are rounded over a cell"
+    )
+    die_stl: str | None = Field(
+        None,
+        description="a die of another shape: STL file in mm, its face in z = 0 below the sheet; "
+        "turned over it is the holder",
     )
     hole_radius_mm: Positive = Field(80.0, description="of die and holder")
     edge_radius_mm: Positive = Field(10.0, description="rounding of the holes' edges")
@@ -158,11 +163,12 @@ def check(case: DrapeCase) -> None:
 
 
 def read_files(case: DrapeCase, base: Path) -> None:
-    """Read the file of the punch."""
+    """Read the files of the tools."""
     from ..geometry.triangles import read_stl
 
-    if case.punch_stl is not None:
-        read_stl(base / case.punch_stl)
+    for file in (case.punch_stl, case.die_stl):
+        if file is not None:
+            read_stl(base / file)
 
 
 def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
@@ -170,10 +176,10 @@ def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
 
     Args:
         case: the case.
-        base: folder that the path of the punch's file counts from.
+        base: folder that paths of the tools' files count from.
 
     Raises:
-        InputError: the file of the punch cannot be read or is no surface with two sides.
+        InputError: a tool's file cannot be read or is no surface with two sides.
     """
     from ..geometry.distance import DistanceGrid
     from ..geometry.triangles import read_stl
@@ -191,13 +197,20 @@ def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
     def holder(time: float) -> tuple[float, float, float]:
         return x, y, case.holder_gap_start_mm + closing * min(time / case.holder_closing_s, 1.0)
 
-    hole, edge = case.hole_radius_mm, case.edge_radius_mm
+    def die(time: float) -> tuple[float, float, float]:
+        return x, y, 0.0
+
     cell = case.punch_cell_mm
+    first: Tool = Sphere("punch", punch, case.punch_radius_mm)
+    if shape is not None:
+        first = Mould("punch", punch, shape, DistanceGrid.of(shape, cell, 3.0 * cell))
+    if case.die_stl is not None:
+        plate = Mould.from_stl("die", die, base / case.die_stl, cell=cell, margin=3.0 * cell)
+        return [first, plate, plate.turned_over("holder", holder)]
+    hole, edge = case.hole_radius_mm, case.edge_radius_mm
     return [
-        Sphere("punch", punch, case.punch_radius_mm)
-        if shape is None
-        else Mould("punch", punch, shape, DistanceGrid.of(shape, cell, 3.0 * cell)),
-        HoledPlate("die", lambda time: (x, y, 0.0), hole, edge, 1.0),
+        first,
+        HoledPlate("die", die, hole, edge, 1.0),
         HoledPlate("holder", holder, hole, edge, -1.0),
     ]
 
