@@ -220,6 +220,12 @@ def summarise(result: dict[str, Any], folder: Any) -> None:
     for name, value in quantities.items():
         if isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
             console.print(_rows(name, value))
+    error = result.get("discretisation_error")
+    if error is not None:
+        console.print(
+            f"error of the {error['of']}: about {error['estimate_deg']:.2g}°, by {error['source']}",
+            soft_wrap=True,
+        )
 
 
 def _rows(name: str, rows: list[dict[str, Any]]) -> Table:

@@ -29,10 +29,12 @@ from ..output.convergence import draw_convergence
 from ..output.fibres import nearest_tool
 from ..output.files import write_text
 from ..output.folder import prepare_folder
+from ..output.record import write_result
 from ..output.results import read_results
 from ..parallel import from_root
 from .cases import Case
-from .drape import DrapeCase, shear_at
+from .discretisation_error import recovered_error, studied_error
+from .drape import DrapeCase, mirrors, shear_at
 from .levels import FAMILIES, Family, Level, families
 from .richardson import Estimate, estimate_error
 from .run import run
@@ -65,6 +67,7 @@ class Outcome:
         shear: at these [degrees], (n,).
         region: of these, one of REGIONS beside "all", (n,).
         numbers: the punch's force [N] and the shear at the case's points [degrees], by name.
+        estimate: of its error by the run alone [degrees].
     """
 
     net: Net
@@ -72,6 +75,7 @@ class Outcome:
     shear: Floats
     region: npt.NDArray[np.str_]
     numbers: dict[str, float]
+    estimate: float
 
 
 def converge(
@@ -157,7 +161,7 @@ def _run(
     return result
 
 
-def _outcome(folder: Path, result: dict[str, Any]) -> Outcome:
+def _outcome(case: DrapeCase, folder: Path, result: dict[str, Any]) -> Outcome:
     results = read_results(folder)
     net, snapshot, tools = results.at(results.nearest(None))
     flat = net.points[net.crossings].mean(axis=1)
@@ -167,15 +171,20 @@ def _outcome(folder: Path, result: dict[str, Any]) -> Outcome:
     punch = np.array([tool.name == "punch" for tool in tools])[which]
     # The die's face lies in z = 0.
     on_die = np.where(on_tool[:, 2] > -1e-3, "flange", "edge")
+    shear = np.degrees(axes_shear(snapshot.axes))
     numbers = {"punch_force_N": result["quantities"]["punch_force_N"]}
-    for point in result["quantities"]["points"]:
-        numbers[f"shear at {point['x_mm']:g}, {point['y_mm']:g} [°]"] = point["shear_deg"]
+    if case.points:
+        at = np.array([[point.x_mm, point.y_mm] for point in case.points])
+        values = shear_at(net, shear, at, quarter=case.symmetry == "quarter")
+        names = [f"shear at {x:g}, {y:g} [°]" for x, y in at]
+        numbers |= dict(zip(names, values.tolist(), strict=True))
     return Outcome(
         net,
         flat[:, :2],
-        np.degrees(axes_shear(snapshot.axes)),
+        shear,
         np.where(punch, "dome", on_die),
         numbers,
+        recovered_error(net, snapshot, mirrors(case))["estimate_deg"],
     )
 
 
@@ -184,7 +193,7 @@ def _study(
 ) -> dict[str, Any]:
     """Compare the runs and write what comes out; one rank calls it."""
     outcomes = {
-        name: _outcome(folder / name, result)
+        name: _outcome(case, folder / name, result)
         for name, result in results.items()
         if result["completed"]
     }
@@ -199,6 +208,9 @@ def _study(
     write_text(folder / "converge.json", json.dumps(study, indent=2) + "\n")
     write_text(folder / "converge.csv", pd.DataFrame(_rows(compared)).to_csv(index=False))
     draw_convergence(folder / "converge.png", study)
+    error = studied_error(study["total"])
+    if error is not None:
+        write_result(folder / "case", {**results["case"], "discretisation_error": error})
     return study
 
 
@@ -215,6 +227,7 @@ def _family(
             "size": level.size,
             "completed": results[level.folder]["completed"],
             "stopped_because": results[level.folder]["stopped_because"],
+            "estimate_deg": outcomes[level.folder].estimate if level.folder in outcomes else None,
         }
         for level in family.levels
     ]

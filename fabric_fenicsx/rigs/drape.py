@@ -235,6 +235,11 @@ def symmetry_planes(net: Net) -> list[Support]:
     return planes
 
 
+def mirrors(case: DrapeCase) -> tuple[int, ...]:
+    """Axes whose planes mirror what is modelled."""
+    return (0, 1) if case.symmetry == "quarter" else ()
+
+
 def contact_law(keys: ContactKeys) -> ContactLaw:
     """Pressure and friction law of the case."""
     from ..solving.parts import ContactLaw
@@ -268,7 +273,7 @@ def build(case: DrapeCase, session: Session) -> Model:
         contact_law=contact_law(case.contact),
         pressed=pressed(case),
         supports=symmetry_planes(net) if case.symmetry == "quarter" else (),
-        symmetry=(0, 1) if case.symmetry == "quarter" else (),
+        symmetry=mirrors(case),
         **({} if weave is None else crossing_weights(weave, keys, net, session.base)),
     )
 
@@ -334,8 +339,10 @@ def run(case: DrapeCase, session: Session) -> dict[str, Any]:
 def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dict[str, Any]:
     """Tables, pictures and quantities of the last accepted step."""
     from .common import extend, lowest
+    from .discretisation_error import recovered_error
 
     quantities: dict[str, Any] = {}
+    error = None
     snapshot, net = outcome.last, model.net
     if snapshot is not None:
         _write_crossings(session, net, snapshot)
@@ -350,9 +357,10 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             "kinetic_over_stored_energy": _kinetic_share(outcome.rows),
             "points": _points(case, net, snapshot),
         }
+        error = recovered_error(net, snapshot, mirrors(case))
         if session.root and session.pictures:
             _draw(case, session, model, snapshot)
-    return extend(outcome.summary, quantities, session)
+    return {**extend(outcome.summary, quantities, session), "discretisation_error": error}
 
 
 def _points(case: DrapeCase, net: Net, snapshot: Snapshot) -> list[dict[str, Any]]:

@@ -117,13 +117,14 @@ FAMILIES: dict[str, tuple[Callable[[DrapeCase], Made], str, str, float]] = {
         _contact,
         "contact stiffness [N/mm²]",
         "compliance of the contact [mm²/N]",
-        1.0,
+        0.5,
     ),
 }
 """Levels of a family, what is varied, what its size is, and the formal order in it.
 
-Beams with one point per cell, shear from places of crossings and generalised-α are of order 2; a
-penalty's penetration goes with the inverse of its stiffness.
+Beams with one point per cell, shear from places of crossings and generalised-α are of order 2. A
+tow that presses with p per length lies √(2 δ p/k) deep in the first layer δ of the pressure law
+(mechanics.contact), where stiff contact ends: order 1/2 in the compliance 1/k.
 """
 
 
