@@ -1,7 +1,6 @@
 """Convergence studies: orders and errors recovered, the same fabric at any spacing, restart."""
 
 import json
-import os
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -12,12 +11,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from test_rigs import SMALL
+from ufl import as_ufl
 
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.axes import tow_axes
 from fabric_fenicsx.fabric.gmsh_io import mesh_net
 from fabric_fenicsx.fabric.sheet import centred_sheet
+from fabric_fenicsx.mechanics.contact import pressure
 from fabric_fenicsx.rigs import convergence
 from fabric_fenicsx.rigs.common import section
 from fabric_fenicsx.rigs.convergence import converge
@@ -96,7 +97,7 @@ def test_what_an_estimate_does_with_less():
         # 48 mm do not divide half of 288 - 144 = 72; with 36 there would be a single tow.
         ("spacing", {"sheet": {"width_mm": 72, "length_mm": 72}}, [12, 6], 0),
         ("steps", {}, [2, 1, 0.5, 0.25], 1),
-        ("contact", {}, [0.125, 0.5, 2], 1),
+        ("contact", {}, [2, 0.5, 0.125], 1),
     ],
 )
 def test_the_case_is_among_its_levels(name, keys, values, own):
@@ -133,6 +134,22 @@ def test_another_spacing_is_the_same_fabric():
         values = [getattr(c.contact, name) / c.spacings[0] for c in (case, other)]
         assert values[1] == pytest.approx(values[0])
     assert same_fabric(other, 4.0) == case
+
+
+def test_less_penetration_at_the_same_pressure():
+    """The law k d²/(2 δ), beyond the layer k (d − δ/2), at d/f; the overlap goes with it."""
+    (family,) = families(small(), ["contact"])
+    for level in family.levels:
+        keys, part = level.case.contact, level.size / 0.5
+        for d in (0.2, 0.8):
+            at = (d * part, keys.stiffness_N_mm2, keys.layer_mm)
+            assert pressure(*map(as_ufl, at))(()) == pytest.approx(
+                pressure(as_ufl(d), as_ufl(0.5), as_ufl(0.5))(())
+            )
+        assert level.case.holder_gap_mm == pytest.approx(-0.2 * part)
+        assert keys.stick_stiffness_N_mm2 * part == pytest.approx(0.5)
+    pushed = small(holder_force_N=60)
+    assert families(pushed, ["contact"])[0].levels[0].case.holder_gap_mm == pushed.holder_gap_mm
 
 
 @pytest.mark.parametrize("factor", [1.0, 0.5])
@@ -389,10 +406,9 @@ def test_a_die_from_a_file_has_its_face_in_z_0():
 
 @pytest.fixture(scope="module")
 def hemisphere(tmp_path_factory):
-    """The demo's study; where it is kept says FABRIC_CONVERGENCE, else it is run."""
-    kept = os.environ.get("FABRIC_CONVERGENCE")
-    folder = Path(kept) if kept else tmp_path_factory.mktemp("hemisphere")
-    return converge(load_case(DEMOS / "drape.yaml"), folder, base=DEMOS, resume=bool(kept))
+    """The demo's study."""
+    folder = tmp_path_factory.mktemp("hemisphere")
+    return converge(load_case(DEMOS / "drape.yaml"), folder, base=DEMOS)
 
 
 @pytest.mark.slow
@@ -404,7 +420,7 @@ def test_the_hemisphere_converges(hemisphere):
     coarse, fine = rows["spacing"]["changes_deg"]  # 12 to 6 mm, 6 to 3 mm
     assert coarse < 1.0 and fine < 0.25
     assert rows["spacing"]["order"] == pytest.approx(2.0, abs=0.5)
-    assert rows["contact"]["changes_deg"][1] < 0.2  # four times as stiff
+    assert rows["contact"]["order"] is not None
     assert max(rows["steps"]["changes_deg"][1:]) < 0.1  # down to a quarter
 
 
@@ -412,6 +428,7 @@ def test_the_hemisphere_converges(hemisphere):
 @pytest.mark.parametrize(
     "keys",
     [
+        {"contact.stiffness_N_mm2": 2.0},  # four times as stiff
         {"tow.relaxation_time_s": 0.5},
         {"tow.relaxation_time_s": 2.0},
         {"symmetry": "none", "punch_offset_x_mm": 0.05},
@@ -419,10 +436,14 @@ def test_the_hemisphere_converges(hemisphere):
     ids=str,
 )
 def test_the_hemisphere_does_not_depend_on(keys, tmp_path):
-    """Viscosity, and a punch beside its axis: less than 0.2 degrees."""
+    """Viscosity, and tools beside the sheet's middle: less than 0.2 degrees.
+
+    With friction: without it a whole sheet slides off sideways, by 4.6 mm from an offset of 0.05.
+    """
     tables = []
-    for k, settings in enumerate(([], [f"{key}={value}" for key, value in keys.items()])):
-        case = load_case(DEMOS / "drape.yaml", settings)
+    for k, changed in enumerate(({}, keys)):
+        settings = [f"{key}={value}" for key, value in changed.items()]
+        case = load_case(DEMOS / "drape.yaml", ["contact.friction=0.1", *settings])
         assert run(case, tmp_path / str(k), base=DEMOS, pictures=False)["completed"]
         table = pd.read_csv(tmp_path / str(k) / "crossings.csv")
         own = table[(table["x0_mm"] > 0) & (table["y0_mm"] > 0)].sort_values(["x0_mm", "y0_mm"])

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ..errors import InputError
 from ..inputs.keys import one_of
@@ -101,11 +102,20 @@ def _steps(case: DrapeCase) -> Made:
 
 
 def _contact(case: DrapeCase) -> Made:
+    """At the same pressure k d²/(2 δ), and in the same proportion to its layer, less penetration.
+
+    An overlap of die and holder is a penetration too.
+    """
     made = []
     for f in (0.25, 1.0, 4.0):
-        contact = _contact_times(case, f)
-        k = contact.contact.stiffness_N_mm2
-        made.append((k, 1.0 / k, contact))
+        stiffer = _contact_times(case, f)
+        layer = case.contact.layer_mm / f
+        changes: dict[str, Any] = {
+            "contact": stiffer.contact.model_copy(update={"layer_mm": layer})
+        }
+        if case.holder_force_N is None and case.holder_gap_mm < 0.0:
+            changes["holder_gap_mm"] = case.holder_gap_mm / f
+        made.append((layer, layer, case.model_copy(update=changes)))
     return made
 
 
@@ -115,16 +125,15 @@ FAMILIES: dict[str, tuple[Callable[[DrapeCase], Made], str, str, float]] = {
     "steps": (_steps, "largest time step [s]", "largest time step [s]", 2.0),
     "contact": (
         _contact,
-        "contact stiffness [N/mm²]",
-        "compliance of the contact [mm²/N]",
-        0.5,
+        "layer of the contact [mm]",
+        "layer of the contact [mm]",
+        1.0,
     ),
 }
 """Levels of a family, what is varied, what its size is, and the formal order in it.
 
-Beams with one point per cell, shear from places of crossings and generalised-α are of order 2. A
-tow that presses with p per length lies √(2 δ p/k) deep in the first layer δ of the pressure law
-(mechanics.contact), where stiff contact ends: order 1/2 in the compliance 1/k.
+Beams with one point per cell, shear from places of crossings and generalised-α are of order 2; how
+deep a tow lies in a tool, and so the shape that it takes, goes with the layer.
 """
 
 
