@@ -3,6 +3,8 @@
 
 # Processes for `make drape` and for the tests marked mpi; 1 runs the drape without mpirun.
 RANKS ?= 2
+# Processes that share the files of tests; more than one test file at a time may compile and start ranks.
+WORKERS ?= 2
 # What `make image` builds with; podman works as well.
 DOCKER ?= docker
 
@@ -46,7 +48,7 @@ drape: setup ## drape a sheet over a hemisphere into results/drape (RANKS=2)
 # Both halves run, so that one call shows all failures. Finding no test is a failure too.
 test: setup ## run the tests, then those marked mpi on RANKS processes, without the slow ones
 	@status=0; \
-	$(PYTEST) tests -m 'not slow' || status=1; \
+	$(PYTEST) tests -m 'not slow' -n $(WORKERS) --dist loadfile || status=1; \
 	scripts/mpi-test tests -m 'mpi and not slow' || status=1; \
 	exit $$status
 

@@ -20,6 +20,7 @@ __all__ = [
     "counting",
     "following",
     "searching",
+    "show_quantities",
     "summarise",
     "summarise_convergence",
     "summarise_diagnosis",
@@ -28,13 +29,17 @@ __all__ = [
 COMPILING = "compiling forms, about a minute on a first run"
 
 HEADINGS = {
-    "x_mm": "x [mm]",
-    "y_mm": "y [mm]",
+    "x_mm": "x \\[mm]",
+    "y_mm": "y \\[mm]",
     "measured_deg": "measured [°]",
     "std_deg": "± [°]",
     "paper_deg": "paper [°]",
     "angle_deg": "this run [°]",
+    "kinematic_deg": "kinematic net [°]",
 }
+
+UNSHOWN = ("shear_deg", "director_turn_deg")
+"""Of a drape's points, in result.json only: a table has no room for them."""
 
 
 class Following:
@@ -209,7 +214,17 @@ def summarise(result: dict[str, Any], folder: Any) -> None:
         f"{seconds:.1f} s; results in {folder}",
         soft_wrap=True,
     )
-    quantities: dict[str, Any] = result.get("quantities", {})
+    show_quantities(console, result.get("quantities", {}))
+    error = result.get("discretisation_error")
+    if error is not None:
+        console.print(
+            f"error of the {error['of']}: about {error['estimate_deg']:.2g}°, by {error['source']}",
+            soft_wrap=True,
+        )
+
+
+def show_quantities(console: Console, quantities: dict[str, Any]) -> None:
+    """Print quantities, and lists of them as tables of their own."""
     table = Table("quantity", "value", "unit")
     for name, value in quantities.items():
         if isinstance(value, (int, float, str)):
@@ -220,19 +235,13 @@ def summarise(result: dict[str, Any], folder: Any) -> None:
     for name, value in quantities.items():
         if isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
             console.print(_rows(name, value))
-    error = result.get("discretisation_error")
-    if error is not None:
-        console.print(
-            f"error of the {error['of']}: about {error['estimate_deg']:.2g}°, by {error['source']}",
-            soft_wrap=True,
-        )
 
 
 def _rows(name: str, rows: list[dict[str, Any]]) -> Table:
     columns = [
         key
         for key in dict.fromkeys(key for row in rows for key in row)
-        if all(not isinstance(row.get(key), (list, dict)) for row in rows)
+        if key not in UNSHOWN and all(not isinstance(row.get(key), (list, dict)) for row in rows)
     ]
     titles = [HEADINGS.get(key) or _heading(key) for key in columns]
     table = Table(*titles, title=name, title_justify="left")

@@ -10,7 +10,11 @@ import importlib.util
 import io
 from pathlib import Path
 
+import numpy as np
+import pyvista as pv
+
 from fabric_fenicsx.__main__ import main as command_line
+from fabric_fenicsx.output.results import read_results
 from fabric_fenicsx.output.weaves import draw_weave
 
 ROOT = Path(__file__).parents[1]
@@ -55,6 +59,33 @@ def drape() -> None:
     run("animate", str(results), "--frames", "24", "--width", "480", "--out", film)
 
 
+def shells() -> None:
+    """Fibres on the elements of a bowl, the shape of the punch where it has stopped."""
+    results = ROOT / "results" / "gallery"
+    run_of = read_results(results)
+    _, _, tools = run_of.at(run_of.nearest(None))
+    punch = next(tool for tool in tools if tool.name == "punch")
+    part, mapped = results / "part.vtk", results / "mapped.vtu"
+    slope = np.tan(np.radians(np.linspace(-65.0, 65.0, 27)))
+    x, y = np.meshgrid(slope, slope, indexing="ij")
+    length = np.sqrt(1.0 + x**2 + y**2) / np.linalg.norm(punch.points, axis=1).max()
+    pv.StructuredGrid(x / length, y / length, -1.0 / length).save(part)
+    offset = [f"{value:.9g}" for value in punch.place]
+    run("map", str(results), str(part), "--offset", *offset, "--out", str(mapped))
+    mesh = pv.read(mapped)
+    plotter = pv.Plotter(off_screen=True, window_size=[800, 640])
+    title = {"title": "shear angle [degrees]\n", "color": "black"}
+    plotter.add_mesh(mesh, scalars="shear_deg", cmap="coolwarm", scalar_bar_args=title)
+    middles = mesh.cell_centers().extract_points(mesh["covered"] == 1, include_cells=False)
+    middles.points *= 1.01  # before the surface
+    for name, colour in (("warp", "black"), ("weft", "white")):
+        lines = middles.glyph(orient=name, scale=False, factor=5.0, geom=pv.Line())
+        plotter.add_mesh(lines, color=colour, line_width=2, lighting=False)
+    plotter.view_vector((0.6, -0.8, -1.2), viewup=(0.0, 0.0, 1.0))
+    plotter.camera.zoom(1.3)
+    plotter.screenshot(GALLERY / "shell_fibres.png")
+
+
 def keys() -> None:
     """The tables of every rig's keys."""
     text = io.StringIO()
@@ -69,3 +100,4 @@ if __name__ == "__main__":
     keys()
     weaves()
     drape()
+    shells()

@@ -139,22 +139,25 @@ def curved_cantilever(radius, angle, stiffness, force, steps: int = 4):
     return last[:3] - radius * np.array([1.0 - np.cos(angle), np.sin(angle), 0.0])
 
 
-def chebyshev_angle(xi):
+def chebyshev_angle(xi, start=np.pi / 2.0):
     """Angle ω between the tows [rad] of the Chebyshev net on a sphere from two great circles.
 
-    ξ ω″ + ω′ + sin ω = 0 with ω(0) = π/2, ω′(0) = −1 and ξ = u v/R² of the arc lengths u, v. At
-    ξ = 0 the equation's limit is 2 ω″ = −cos ω ω′ = 0.
+    ξ ω″ + ω′ + sin ω = 0 with ω(0) = π/2, or another angle at which the circles cross,
+    ω′(0) = −sin ω(0) and ξ = u v/R² of the arc lengths u, v. At ξ = 0 the equation's limit is
+    2 ω″ = −cos ω ω′.
 
     Args:
         xi: values of ξ >= 0 in any order.
+        start: ω(0) [rad].
     """
     xi = np.asarray(xi, dtype=float)
 
     def rates(x, y):
-        return [y[1], -(y[1] + np.sin(y[0])) / x if x > 0.0 else 0.0]
+        first = -np.cos(y[0]) * y[1] / 2.0
+        return [y[1], -(y[1] + np.sin(y[0])) / x if x > 0.0 else first]
 
     ends = (0.0, max(float(xi.max()), 1e-9))
     solution = solve_ivp(
-        rates, ends, [np.pi / 2.0, -1.0], "DOP853", dense_output=True, rtol=1e-11, atol=1e-12
+        rates, ends, [start, -np.sin(start)], "DOP853", dense_output=True, rtol=1e-11, atol=1e-12
     )
     return solution.sol(xi.ravel())[0].reshape(xi.shape)

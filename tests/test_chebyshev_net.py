@@ -22,8 +22,9 @@ import ufl
 from solve import GivenSection, Statics, orders
 
 from fabric_fenicsx.fabric.chains import net_from_lines
+from fabric_fenicsx.solving.contacts import ContactLaw
 from fabric_fenicsx.solving.model import Model, Support
-from fabric_fenicsx.solving.parts import ContactLaw, CrossoverLaw
+from fabric_fenicsx.solving.parts import CrossoverLaw
 
 #: Radius of the sphere, and how far from the middle tows angles are compared [mm]: to ξ = 0.89,
 #: where the shear angle is 49 degrees.

@@ -116,10 +116,13 @@ def test_run_writes_its_results(completed):
     assert result["ranks"] == 1
     (point,) = result["quantities"]["points"]
     assert 45.0 < point["angle_deg"] <= 90.0
+    # The kinematic net's beside it: at so small a depth both are next to unsheared.
+    assert point["kinematic_deg"] == pytest.approx(point["angle_deg"], abs=0.5)
     assert len(list((folder / "steps").glob("step_*.npz"))) == result["steps"]
     with (folder / "crossings.csv").open(newline="") as file:
         rows = list(csv.reader(file))
-    assert rows[0] == ["x0_mm", "y0_mm", "x_mm", "y_mm", "z_mm", "angle_deg"]
+    angles = ["angle_deg", "shear_deg", "director_turn_deg"]
+    assert rows[0] == ["x0_mm", "y0_mm", "x_mm", "y_mm", "z_mm", *angles]
     assert len(rows) == 1 + 5 * 5
     assert (folder / "paraview" / "tows.pvd").exists()
     for view in ("perspective", "top"):

@@ -29,7 +29,7 @@ from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
 from fabric_fenicsx.rigs.common import Session, control
 from fabric_fenicsx.rigs.drape import DrapeCase, build
 from fabric_fenicsx.rigs.simulation import simulate
-from fabric_fenicsx.solving.parts import ContactLaw
+from fabric_fenicsx.solving.contacts import ContactLaw
 
 RIG = {
     "punch_radius_mm": 76.2,

@@ -12,9 +12,9 @@ from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.fabric.section import RectangularSection
 from fabric_fenicsx.mechanics.contact import root
 from fabric_fenicsx.mechanics.tools import HoledPlate
+from fabric_fenicsx.solving.contacts import ContactLaw
 from fabric_fenicsx.solving.generalised_alpha import GeneralisedAlpha
 from fabric_fenicsx.solving.model import Model, Support
-from fabric_fenicsx.solving.parts import ContactLaw
 from fabric_fenicsx.solving.stepping import StepControl, Stepper
 
 SECTION = RectangularSection(width=4.57, height=0.04, density=7e-9, C1=60000.0)

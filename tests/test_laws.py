@@ -180,7 +180,10 @@ def driven(laws, gammas, length=1.0, **weights):
             end=float(times[-1]),
             control=StepControl(first=length, smallest=length / 2.0, largest=length),
             force_tolerance=1e-6,
-            measure=lambda seen: {"angle": seen.shear_angle[0], "moment": seen.crossing_moment[0]},
+            measure=lambda seen: {
+                "angle": seen.director_turn[0],
+                "moment": seen.crossing_moment[0],
+            },
         )
     assert run.completed and len(run.rows) == len(gammas), run.stop
     gamma, moment = (np.array([row[key] for row in run.rows]) for key in ("angle", "moment"))

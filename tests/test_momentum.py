@@ -7,10 +7,10 @@ from solve import GivenSection, orders, set_loads
 from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.mechanics.tools import Sphere
 from fabric_fenicsx.solving.balance import Balance
+from fabric_fenicsx.solving.contacts import ContactLaw
 from fabric_fenicsx.solving.generalised_alpha import GeneralisedAlpha
 from fabric_fenicsx.solving.model import Model, Support
 from fabric_fenicsx.solving.momentum import Momentum
-from fabric_fenicsx.solving.parts import ContactLaw
 from fabric_fenicsx.solving.stepping import StepControl, Stepper
 
 SECTION = GivenSection((500.0, 200.0, 200.0, 40.0, 60.0, 90.0), (0.02, 0.3, 0.2, 0.1))

@@ -20,8 +20,8 @@ from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.common import Session
 from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
+from fabric_fenicsx.solving.contacts import ContactLaw
 from fabric_fenicsx.solving.model import Model, Support
-from fabric_fenicsx.solving.parts import ContactLaw
 
 SECTION = RectangularSection(width=4.57, height=0.04, density=7e-9, C1=60000.0)
 LENGTH = 40.0
@@ -59,14 +59,18 @@ def squeezed(force, *, mu, pull=0.0, cells=8, far=1e4):
 def height(force):
     """The holder's place z [mm] on a tow between flat plates, its force [N], and the exact place.
 
-    Each face sinks by d with ψ′(d) = F/L: in the layer d = √(2δp/k), beyond it d = p/k + δ/2.
+    Each face sinks by d with kφ′(d) = F/L: d = √(2δp/k), k the given one or what it has grown to.
     """
     model = squeezed(force, mu=0.0)
     Statics(model, force_tolerance=1e-10).run(1)
-    p, k, layer = force / LENGTH, 0.5, 0.5
-    d = np.sqrt(2.0 * layer * p / k) if p < k * layer / 2.0 else p / k + layer / 2.0
-    assert (d > layer) == (force > 10.0)
-    return model.tool_place("holder")[2], model.tool_forces()["holder"][2], 0.1 - 2.0 * d
+    kept = model.histories.save()
+    die, holder = (kept[f"{name}: stiffness"][:, 1] for name in ("die", "holder"))
+    assert np.ptp(die) == pytest.approx(0.0, abs=1e-6 * die[0])
+    assert (die[0] > 0.5 + 1e-9) == (force > 10.0) == (holder[0] > 0.5 + 1e-9)
+    p, layer = force / LENGTH, 0.5
+    d, e = (np.sqrt(2.0 * layer * p / k.mean()) for k in (die, holder))
+    assert max(d, e) < layer / 2.0
+    return model.tool_place("holder")[2], model.tool_forces()["holder"][2], 0.1 - d - e
 
 
 @pytest.mark.mpi

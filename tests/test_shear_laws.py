@@ -210,7 +210,7 @@ def in_a_frame(gammas, laws, folder=None, resume=False):
         end=float(len(gammas)),
         control=StepControl(first=1.0, smallest=0.1, largest=1.0),
         force_tolerance=1e-6,
-        measure=lambda seen: {"angle": seen.shear_angle[0], "moment": seen.crossing_moment[0]},
+        measure=lambda seen: {"angle": seen.director_turn[0], "moment": seen.crossing_moment[0]},
         resume=resume,
     )
     assert run.completed, run.stop

@@ -17,8 +17,11 @@ from .doctor import doctor
 from .export import export
 from .fibres import fibres
 from .keys import keys
+from .kinematic import kinematic
+from .map import map
 from .mesh import mesh
 from .new import new
+from .report import report
 from .run import run
 from .synthesise import synthesise
 from .view import view
@@ -59,10 +62,19 @@ EXAMPLES: dict[Callable[..., None], list[str]] = {
         "converge demos/drape.yaml --only spacing,cells --resume",
     ],
     keys: ["keys drape", "keys --markdown > keys.md"],
+    kinematic: [
+        "kinematic demos/drape.yaml",
+        "kinematic demos/drape.yaml --set punch_travel_mm=40",
+    ],
     mesh: ["mesh demos/drape.yaml --out sheet.msh"],
     view: ["view results/drape", "view results/drape --html", "view results/drape --time 30"],
     animate: ["animate results/drape", "animate results/drape --out drape.mp4"],
+    report: ["report results/drape", "report results/drape --trim 100 --measured angles.csv"],
     fibres: ["fibres results/drape", "fibres results/drape --out fibres.vtu"],
+    map: [
+        "map results/drape part.inp --thickness 0.3 --material ply --out mapped.inp",
+        "map results/drape part.stl --out part.vtu",
+    ],
     export: ["export results/drape net.vtk"],
     diagnose: ["diagnose my_fabric", "diagnose frame strip --effects crossover_friction"],
     synthesise: [

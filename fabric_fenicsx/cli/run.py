@@ -81,6 +81,8 @@ def _run(
     if root:
         if not quiet:
             summarise(result, folder)
+        for sentence in result.get("health", {}).get("warnings", []):
+            say(f"warning: {sentence}")
         if not result["completed"]:
             reason = str(result["stopped_because"]).removeprefix("stopped ")
             say(f"stopped: {reason}; accepted steps are in {folder}")

@@ -104,7 +104,7 @@ class TowLayout:
             raise ValueError(f"tows: subdivisions is {self.subdivisions}; at least 1 is needed")
         if not (isfinite(self.crimp) and self.crimp >= 0.0):
             raise ValueError(f"tows: crimp is {self.crimp}; a length from 0 mm is needed")
-        t, s = self._directions()
+        t, s = self.directions
         between = degrees(np.arctan2(s[0] * t[1] - s[1] * t[0], s @ t))
         if not FLATTEST - 1e-9 <= between <= 180.0 - FLATTEST + 1e-9:
             raise ValueError(
@@ -119,7 +119,9 @@ class TowLayout:
         """The tows of WARP or WEFT."""
         return self.warp if family == WARP else self.weft
 
-    def _directions(self) -> tuple[Floats, Floats]:
+    @property
+    def directions(self) -> tuple[Floats, Floats]:
+        """Unit vectors of the tows of WARP and of WEFT, each of shape (2,)."""
         return _directions(self.warp.angle, self.weft.angle)
 
     def tows(self, family: int) -> list[TowPath]:
@@ -130,7 +132,7 @@ class TowLayout:
         """
         pieces, crossings = self._connected()
         number = _numbers(pieces)
-        direction = self._directions()[family]
+        direction = self.directions[family]
         side = _across(family, direction)
         met: dict[int, list[tuple[float, Floats, float]]] = {}
         for (warp, weft), at in crossings.items():
@@ -174,7 +176,7 @@ class TowLayout:
         positions = self.family(1 - piece.family).positions
         if len(positions) == 1:
             return piece.high - piece.low
-        t, s = self._directions()
+        t, s = self.directions
         return float(np.ptp(positions) / (len(positions) - 1) / abs(t @ _across(WEFT, s)))
 
     def _connected(self) -> tuple[list[_Piece], dict[tuple[int, int], Floats]]:
@@ -197,7 +199,7 @@ class TowLayout:
     def _cut(self, family: int) -> list[_Piece]:
         """Pieces of the family's lines inside the outline, in order."""
         tows = self.family(family)
-        direction = self._directions()[family]
+        direction = self.directions[family]
         side = _across(family, direction)
         pieces = []
         for line, position in enumerate(tows.positions):
@@ -213,7 +215,7 @@ class TowLayout:
 
     def _crossings(self, pieces: Sequence[_Piece]) -> dict[tuple[int, int], Floats]:
         """Where warp pieces cross weft pieces [mm], by their places in the list."""
-        t, s = self._directions()
+        t, s = self.directions
         a, b = _across(WARP, t), _across(WEFT, s)
         rounding = ROUNDING * max(piece.high - piece.low for piece in pieces) if pieces else 0.0
         of_line: dict[tuple[int, int], list[int]] = {}
@@ -240,7 +242,7 @@ class TowLayout:
     def _refuse_asymmetry(self) -> None:
         for family, wanted in ((WARP, (0.0, 1.0)), (WEFT, (1.0, 0.0))):
             tows = self.family(family)
-            direction = self._directions()[family]
+            direction = self.directions[family]
             side = _across(family, direction)
             if not np.array_equal(direction, wanted):
                 raise ValueError("tows: a quarter needs warp at 90 and weft at 0 degrees")

@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from .triangles import Triangles
 
-__all__ = ["DistanceGrid", "exact_distance"]
+__all__ = ["DistanceGrid", "cubic_basis", "exact_distance"]
 
 Array = npt.NDArray[np.float64]
 
@@ -135,7 +135,7 @@ class DistanceGrid:
         c = self.coefficients[
             index[:, 0, :, None, None], index[:, 1, None, :, None], index[:, 2, None, None, :]
         ]
-        value, slope, curve = _basis(t)
+        value, slope, curve = cubic_basis(t)
 
         def contracted(*weights: Array) -> Array:
             along_z = np.einsum("nijk,nk->nij", c, weights[2])
@@ -155,7 +155,7 @@ class DistanceGrid:
         return distance, gradient / self.cell, hessian / self.cell**2
 
 
-def _basis(t: Array) -> tuple[Array, Array, Array]:
+def cubic_basis(t: Array) -> tuple[Array, Array, Array]:
     """The four cubic B-splines at t in [0, 1] and their first two derivatives, (..., 4) each."""
     r = 1.0 - t
     value = np.stack([r**3, 4 - 6 * t**2 + 3 * t**3, 4 - 6 * r**2 + 3 * r**3, t**3], axis=-1) / 6.0

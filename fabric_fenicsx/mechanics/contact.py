@@ -1,24 +1,49 @@
 """Contact of the tows with rigid tools, in the nodes.
 
-    E = ∫ ψ(d) ds,   d = penetration = −signed distance                        (pressure)
+    E = ∫ k φ(d) ds,   p = k φ′(d),   d = penetration = −signed distance       (pressure)
     t = T min(1, μ p/|T|),   T = P (t_n + k_t (Δu − Δtool)),   P = 1 − n⊗n      (Coulomb friction)
 
-ψ grows with d³ over a first layer δ, then with d²: the force per length k d²/(2δ), then
+φ grows with d³ over a first layer δ, then with d²: the force per length k d²/(2δ), then
 k (d − δ/2), is continuous with its first derivative. With a corner in it Newton falls into a cycle
 of the same nodes going in and out of contact.
+
+k belongs to a node and a tool and follows the load, so that d stays below δ/2: where d comes near
+that, k becomes what gives the same pressure at a lesser penetration d*,
+
+    k ← k φ′(d)/φ′(d*),
+
+as penalties grow in augmented Lagrangian methods where the constraint's violation does not fall
+(Bertsekas, Constrained Optimization and Lagrange Multiplier Methods, 1982, section 2.2.5). A
+multiplier beside it was tried and left out: near the tool it presses on nodes that do not touch it.
+A change of k at the penetration d_n puts (k − k_n) φ(d_n) into the store that nothing has worked
+for: booked as a negative loss.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from ufl import as_vector, conditional, diff, dot, lt, max_value, min_value, sqrt, variable
+from ufl import (
+    as_vector,
+    conditional,
+    diff,
+    dot,
+    gt,
+    lt,
+    max_value,
+    min_value,
+    sqrt,
+    variable,
+)
 
 from .fields import TowFields, translation_part
 
 __all__ = [
+    "LIMIT",
     "contact_energy",
+    "followed",
     "friction_traction",
+    "penetration_energy",
     "plate_with_hole",
     "pressure",
     "sampled_distance",
@@ -26,6 +51,14 @@ __all__ = [
     "traction_loss",
     "traction_work",
 ]
+
+#: Penetration over the layer that no accepted step exceeds in any node.
+LIMIT = 0.5
+
+#: Penetrations over the layer beyond which the stiffness of a node grows at the end of a step, and
+#: at which the pressure is then the same. Apart enough that it grows seldom, near enough that
+#: Newton's method hardly feels it: every change takes the next step some iterations.
+NEAR_LIMIT, AIM = 0.45, 0.4
 
 #: Length [mm] that rounds the roots of the distance functions where they have a corner (on the
 #: tool's axis, and in the core of the rounded edge, which no fabric reaches).
@@ -41,14 +74,25 @@ def contact_energy(fields: TowFields, distance: Any, stiffness: Any, layer: Any)
     ``stiffness`` k [N/mm²] is force per tow length and penetration, ``layer`` δ [mm].
     """
     d = max_value(-distance(fields.position), 0.0)
-    soft = stiffness * d**3 / (6 * layer)
-    firm = stiffness * ((d - layer / 2) ** 2 / 2 + layer**2 / 24)
-    return conditional(lt(d, layer), soft, firm) * fields.nodes
+    return stiffness * penetration_energy(d, layer) * fields.nodes
+
+
+def penetration_energy(d: Any, layer: Any) -> Any:
+    """φ(d) [mm²] at a penetration d >= 0 [mm]."""
+    soft = d**3 / (6 * layer)
+    firm = (d - layer / 2) ** 2 / 2 + layer**2 / 24
+    return conditional(lt(d, layer), soft, firm)
 
 
 def pressure(d: Any, stiffness: Any, layer: Any) -> Any:
     """Force per tow length [N/mm] at a penetration d >= 0 [mm], ψ′(d)."""
     return conditional(lt(d, layer), stiffness * d**2 / (2 * layer), stiffness * (d - layer / 2))
+
+
+def followed(d: Any, stiffness: Any, layer: Any) -> Any:
+    """The stiffness k [N/mm²] that follows the load at a penetration d >= 0 [mm] under k."""
+    wanted = stiffness * pressure(d, 1.0, layer) / pressure(AIM * layer, 1.0, layer)
+    return conditional(gt(d, NEAR_LIMIT * layer), wanted, stiffness)
 
 
 def friction_traction(

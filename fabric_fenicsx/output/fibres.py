@@ -20,6 +20,7 @@ import pyvista as pv
 
 from fabric_fenicsx.fabric.crossings import crossing_numbers, reference_angle
 from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.fabric.quads import meshes
 from fabric_fenicsx.output.files import write_text
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
 from fabric_fenicsx.solving.snapshot import Snapshot
@@ -138,7 +139,7 @@ def fibre_map(net: Net, snapshot: Snapshot, tools: Sequence[TriangleSurface] = (
         density=np.cos(reference) / np.cos(reference + snapshot.shear_angle),
         mould=mould,
         moved=moved,
-        quads=_quads(net),
+        quads=meshes(net),
     )
 
 
@@ -155,29 +156,6 @@ def nearest_tool(tools: Sequence[TriangleSurface], places: Array) -> tuple[Integ
         best[nearer], which[nearer], points[nearer] = distance[nearer], k, found[nearer]
         normals[nearer] = np.asarray(mesh.face_normals)[np.asarray(cells)[nearer]]
     return which, points, normals
-
-
-def _quads(net: Net) -> Integers:
-    """Crossings around each mesh of the fabric: two neighbours on a warp, and those beside them."""
-    along_warp, along_weft = (_next(net, side) for side in (0, 1))
-    first = np.arange(len(net.crossings))
-    # The place after the last crossing is itself: -1 leads to -1.
-    beside, further = along_weft[first], along_warp[first]
-    opposite = along_weft[further]
-    whole = (further >= 0) & (beside >= 0) & (opposite >= 0) & (along_warp[beside] == opposite)
-    return np.column_stack([first, further, opposite, beside])[whole]
-
-
-def _next(net: Net, side: int) -> Integers:
-    """The next crossing along the warp (0) or weft (1) tow; -1 after the last, and of -1."""
-    tow = np.empty(len(net.points), dtype=np.int64)
-    tow[net.cells.ravel()] = np.repeat(net.cell_tow, 2)
-    nodes = net.crossings[:, side]
-    order = np.argsort(nodes)  # nodes rise along each tow
-    same = np.diff(tow[nodes[order]]) == 0
-    following = np.full(len(nodes) + 1, -1)
-    following[order[:-1][same]] = order[1:][same]
-    return following
 
 
 def _unit(vectors: Array) -> Array:

@@ -56,8 +56,13 @@ def write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]], *, compressed:
     _write(path, memory.getbuffer())
 
 
-def write_vtk(path: Path, data: Any) -> None:
+def write_vtk(path: Path, data: Any, *, portable: bool = False) -> None:
     """Write a vtkPolyData (.vtp) or a vtkUnstructuredGrid (.vtu).
+
+    Args:
+        path: the file.
+        data: what to write.
+        portable: encoded and compressed as readers other than VTK's know it.
 
     Raises:
         OSError: it cannot be written; what was there before stays.
@@ -65,9 +70,13 @@ def write_vtk(path: Path, data: Any) -> None:
     polygons = data.IsA("vtkPolyData")
     writer: Any = vtkXMLPolyDataWriter() if polygons else vtkXMLUnstructuredGridWriter()
     writer.SetInputData(data)
-    writer.SetDataModeToAppended()
-    writer.EncodeAppendedDataOff()
-    writer.SetCompressorTypeToLZ4()  # ten times as fast as zlib, files twice as large
+    if portable:
+        writer.SetDataModeToBinary()
+        writer.SetCompressorTypeToZLib()
+    else:
+        writer.SetDataModeToAppended()
+        writer.EncodeAppendedDataOff()
+        writer.SetCompressorTypeToLZ4()  # ten times as fast as zlib, files twice as large
     # VTK itself dies of a full disk.
     writer.WriteToOutputStringOn()
     if writer.Write() != 1:

@@ -140,14 +140,14 @@ def draw_net(
             specular_power=18.0,
             show_scalar_bar=False,
         )
-        _scale(plotter, quantity.title, limits, step, size)
+        scale_bar(plotter, quantity.title, limits, step, size)
         if title is not None:
             headline(plotter, title, 18.0 * _unit(size))
         if tools:
             plotter.enable_depth_peeling(8)
         clouds = (np.asarray(mesh.points) for mesh in (tubes, *(mesh for mesh, _ in tools)))
         shown = list(clouds) if frame is None else [frame]
-        _aim(plotter, view, shown, size)
+        aim(plotter, view, shown, size)
 
 
 def colour_map(quantity: Quantity, limits: tuple[float, float]) -> Any:
@@ -177,7 +177,7 @@ def _unit(size: tuple[int, int]) -> float:
     return min(size[0] / 4.0, size[1] / 3.0) / 400.0
 
 
-def _scale(
+def scale_bar(
     plotter: Any, title: str, limits: tuple[float, float], step: float, size: tuple[int, int]
 ) -> None:
     """The colour scale on the right, labelled at round values."""
@@ -204,7 +204,7 @@ def _scale(
     bar.SetLabelFormat("  %.4g")  # a text pad would shift the labels along the bar
 
 
-def _aim(plotter: Any, view: str, clouds: list[Array], size: tuple[int, int]) -> None:
+def aim(plotter: Any, view: str, clouds: list[Array], size: tuple[int, int]) -> None:
     """Set the camera so that all points fill the frame left of the scale and below the title."""
     left, right, bottom, top = -0.94, 0.66, -0.93, 0.84  # of the frame, in -1..1
     to_eye, up = (np.array(v) for v in VIEWS[view])

@@ -53,6 +53,10 @@ class Record:
         case_text: what `case.yaml` shall say; None writes none.
         quarter: whether the model is the part x >= 0, y >= 0 of a symmetric sheet; forces and
             energies in `steps.csv` are of the whole one.
+
+    Attributes:
+        rows: of `steps.csv`, on every rank.
+        gaps: distance of each node from each tool at the last step [mm], (n_nodes,).
     """
 
     def __init__(
@@ -66,6 +70,7 @@ class Record:
     ) -> None:
         self.folder, self.model = folder, model
         self.rows: list[dict[str, float]] = []
+        self.gaps: dict[str, npt.NDArray[np.float64]] = {}
         self.steps = folder / "steps"
         self._root = model.comm.rank == 0
         self._seen: dict[str, npt.NDArray[np.float64]] = {}
@@ -74,7 +79,8 @@ class Record:
             (folder / "case.yaml").unlink(missing_ok=True)
             if case_text is not None:
                 write_text(folder / "case.yaml", case_text)
-        past = model.comm.bcast(self.rows[-1] if self.rows else None)
+        self.rows = model.comm.bcast(self.rows)
+        past = self.rows[-1] if self.rows else None
         self._balance = Balance(model, past, quarter=quarter)
 
     def _open(self, resume_at: float | None) -> None:
@@ -108,6 +114,9 @@ class Record:
             "failed_attempts": step.failures,
         }
         row |= self._balance.step(step.time)
+        self.gaps = model.gaps()
+        for tool, gap in self.gaps.items():
+            row[f"{tool}_penetration_mm"] = max(0.0, -float(gap.min()))
         row |= measure(snapshot)
         self.rows.append(row)
         places = {tool.name: model.tool_place(tool.name) for tool in model.tools}

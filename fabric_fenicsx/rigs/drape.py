@@ -29,8 +29,8 @@ from .weave_keys import SheetKeys, WeaveKeys, crossing_weights, layout
 
 if TYPE_CHECKING:
     from ..mechanics.tools import Tool
+    from ..solving.contacts import ContactLaw
     from ..solving.model import Model, Support
-    from ..solving.parts import ContactLaw
     from ..solving.snapshot import Snapshot
     from .common import Session
     from .simulation import Run
@@ -41,8 +41,13 @@ __all__ = ["RIG", "DrapeCase", "build", "run", "shear_at", "tools"]
 class ContactKeys(Keys):
     """Pressure and friction between tows and tools."""
 
-    stiffness_N_mm2: Positive = Field(0.5, description="force per tow length and penetration")
-    layer_mm: Positive = Field(0.5, description="penetration over which the stiffness builds up")
+    stiffness_N_mm2: Positive = Field(
+        1.0, description="force per tow length and penetration, to begin with; follows the load"
+    )
+    layer_mm: Positive = Field(
+        1.0,
+        description="penetration over which the stiffness builds up; half of it is never exceeded",
+    )
     friction: NotNegative = Field(0.0, description="Coulomb coefficient; 0 for oiled tools")
     stick_stiffness_N_mm2: Positive = Field(
         0.5, description="friction force per tow length and stretch of the stick"
@@ -94,7 +99,8 @@ class DrapeCase(Case):
     holder_gap_start_mm: float = Field(1.0, description="between holder and die at the start")
     holder_gap_mm: float = Field(
         -0.2,
-        description="between holder and die when closed; below zero the contact layers overlap",
+        description="between holder and die when closed; below zero the contact layers overlap, "
+        "at most by contact.layer_mm / 2",
     )
     holder_force_N: Positive | None = Field(
         None,
@@ -119,6 +125,10 @@ class DrapeCase(Case):
     def _fits(self) -> DrapeCase:
         if self.holder_force_N is not None and "holder_gap_mm" in self.model_fields_set:
             raise ValueError("holder_force_N, holder_gap_mm: one of the two")
+        if self.holder_force_N is None and self.holder_gap_mm < -self.contact.layer_mm / 2.0:
+            raise ValueError(
+                f"holder_gap_mm: at least -contact.layer_mm / 2 = {-self.contact.layer_mm / 2.0:g}"
+            )
         if self.symmetry == "quarter" and (self.punch_offset_x_mm or self.punch_offset_y_mm):
             raise ValueError("punch_offset_x_mm, punch_offset_y_mm: need symmetry: none")
         too_deep = self.punch_travel_mm > self.punch_radius_mm + self.edge_radius_mm
@@ -240,9 +250,14 @@ def mirrors(case: DrapeCase) -> tuple[int, ...]:
     return (0, 1) if case.symmetry == "quarter" else ()
 
 
+def rim(case: DrapeCase) -> float | None:
+    """Radius at which the die's face begins to be flat [mm]; None where its hole is not round."""
+    return None if case.die_stl is not None else case.hole_radius_mm + case.edge_radius_mm
+
+
 def contact_law(keys: ContactKeys) -> ContactLaw:
     """Pressure and friction law of the case."""
-    from ..solving.parts import ContactLaw
+    from ..solving.contacts import ContactLaw
 
     return ContactLaw(
         keys.stiffness_N_mm2,
@@ -340,11 +355,24 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
     """Tables, pictures and quantities of the last accepted step."""
     from .common import extend, lowest
     from .discretisation_error import recovered_error
+    from .health import drape_health
 
     quantities: dict[str, Any] = {}
-    error = None
+    summary = outcome.summary
     snapshot, net = outcome.last, model.net
     if snapshot is not None:
+        summary["health"] = drape_health(
+            net,
+            snapshot,
+            outcome.gaps,
+            outcome.rows,
+            layer=case.contact.layer_mm,
+            rim=rim(case),
+            quarter=case.symmetry == "quarter",
+            stiffness=model.stiffness,
+            iterations=summary["newton_iterations"],
+            wasted=summary["wasted_iterations"],
+        )
         _write_crossings(session, net, snapshot)
         row = outcome.rows[-1]
         quantities = {
@@ -355,17 +383,20 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             "largest_shear_angle_deg": row["largest_shear_deg"],
             "lowest_point_mm": lowest(net, snapshot.displacement),
             "kinetic_over_stored_energy": _kinetic_share(outcome.rows),
-            "points": _points(case, net, snapshot),
+            "points": _points(case, session, net, outcome),
         }
-        error = recovered_error(net, snapshot, mirrors(case))
+        summary["discretisation_error"] = recovered_error(net, snapshot, mirrors(case))
         if session.root and session.pictures:
             _draw(case, session, model, snapshot)
-    return {**extend(outcome.summary, quantities, session), "discretisation_error": error}
+    return extend(summary, quantities, session)
 
 
-def _points(case: DrapeCase, net: Net, snapshot: Snapshot) -> list[dict[str, Any]]:
+def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[dict[str, Any]]:
     """The case's points with the acute angle there, as a protractor on a photograph gives it."""
-    if not case.points:
+    from .kinematic import known_angles
+
+    snapshot = outcome.last
+    if not case.points or snapshot is None:
         return []
     places = np.array([[p.x_mm, p.y_mm] for p in case.points])
     quarter = case.symmetry == "quarter"
@@ -376,14 +407,16 @@ def _points(case: DrapeCase, net: Net, snapshot: Snapshot) -> list[dict[str, Any
             reference_angle(net) + snapshot.director_turn,
         )
     )
+    known = known_angles(case, session.base) if outcome.completed else [None] * len(places)
     return [
         {
             **point.model_dump(exclude_none=True),
             "angle_deg": round(90.0 - abs(float(shear)), 3),
             "shear_deg": round(float(shear), 3),
             "director_turn_deg": round(float(turn), 3),
+            **({} if kinematic is None else {"kinematic_deg": kinematic}),
         }
-        for point, shear, turn in zip(case.points, axes, directors, strict=True)
+        for point, shear, turn, kinematic in zip(case.points, axes, directors, known, strict=True)
     ]
 
 

@@ -8,6 +8,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from .. import _dolfinx
 from ..errors import InputError, SolveError
 from ..output.folder import prepare_folder
@@ -15,6 +18,7 @@ from ..output.record import Record, load_state
 from ..solving.model import Model
 from ..solving.snapshot import Snapshot
 from ..solving.stepping import Step, StepControl, Stepper
+from .health import pointless
 
 __all__ = ["Run", "simulate"]
 
@@ -30,6 +34,7 @@ class Run:
         stop: why it stopped, if it did not.
         rows: what was recorded at each accepted step.
         last: the last accepted step, if there was one.
+        gaps: distance of its nodes from each tool [mm], (n_nodes,).
         summary: the fixed part of result.json.
     """
 
@@ -37,6 +42,7 @@ class Run:
     stop: str | None
     rows: list[dict[str, float]]
     last: Snapshot | None
+    gaps: dict[str, npt.NDArray[np.float64]]
     summary: dict[str, Any]
 
 
@@ -103,7 +109,17 @@ def simulate(
         progress(step.time, step.number, step.iterations)
 
     stepper.observe = observe
-    stepper.keep = lambda step: record.keep(step, stepper)
+
+    def keep(step: Step) -> None:
+        record.keep(step, stepper)
+        reason = pointless(record.rows, end, [tool.name for tool in model.tools])
+        reason = model.comm.bcast(reason)
+        if reason:
+            raise SolveError(
+                f"stopped at t = {step.time:.6g} s after {step.number} accepted steps: {reason}"
+            )
+
+    stepper.keep = keep
     stop = None
     try:
         for stop_at in (*sorted(stops), end):
@@ -131,4 +147,4 @@ def simulate(
         "dofs": int(model.net.points.shape[0] * 6),
         "seconds": {key: round(value, 3) for key, value in seconds.items()},
     }
-    return Run(stop is None, stop, record.rows, last[0] if last else None, summary)
+    return Run(stop is None, stop, record.rows, last[0] if last else None, record.gaps, summary)

@@ -9,6 +9,7 @@ are copies of the tows' dofs, filled and emptied through global block numbers.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 from mpi4py import MPI
@@ -239,6 +240,22 @@ class Discretisation:
         ordered = np.zeros_like(values)
         ordered[self.connector_order] = values
         return ordered
+
+    def node_values(self, form: Any, size: int) -> Array:
+        """Nodal values of what beam.node_sums sums up, (n_blocks, size); not those of ghosts."""
+        values = np.zeros((len(self.local_nodes), size))
+        _dolfinx.add_vector(values.ravel(), form)
+        weights = self._node_lengths[:, None]
+        return np.divide(values, weights, out=values, where=weights > 0.0)
+
+    @cached_property
+    def _node_lengths(self) -> Array:
+        """Tow length of the owned cells at each local node [mm]."""
+        local = np.zeros(len(self.local_nodes))
+        count = len(self.owned_cells)
+        half = self.net.lengths[self.owned_cells] / 2.0
+        np.add.at(local, _dolfinx.cell_dofs(self.tows.space)[:count].ravel(), np.repeat(half, 2))
+        return local
 
     def matrix(self, *, crossings: bool = True, symmetric: bool = False) -> PETSc.Mat:
         """An empty matrix with exactly the blocks that the tows and the crossings need.

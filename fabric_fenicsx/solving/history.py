@@ -32,7 +32,6 @@ class Histories:
         self.disc = disc
         self._entries: dict[str, tuple[Where, Any, Any]] = {}
         self._numbers: dict[str, Array] = {}
-        self._node_length: Array | None = None
 
     def add(self, name: str, where: Where, field: Any, expression: Any) -> None:
         """Remember ``expression`` in ``field``. Collective; compiles.
@@ -83,19 +82,23 @@ class Histories:
 
     def update(self) -> None:
         """Evaluate every expression, then change the fields."""
-        new = []
-        for where, field, form in self._entries.values():
-            if field is None:
-                continue
-            values = np.zeros_like(field.x.array)
-            _dolfinx.add_vector(values, form)
-            if where == "nodes":
-                weights = np.repeat(self._lengths(), 3)
-                np.divide(values, weights, out=values, where=weights > 0.0)
-            new.append((field, values))
-        for field, values in new:
-            field.x.array[:] = values
+        new = {
+            name: self.next(name) for name, entry in self._entries.items() if entry[1] is not None
+        }
+        for name, values in new.items():
+            field = self._entries[name][1]
+            field.x.array[:] = values.ravel()
             field.x.scatter_forward()
+
+    def next(self, name: str) -> Array:
+        """Next values of a field on this rank, those of ghosts not to be used, (n, size)."""
+        where, field, form = self._entries[name]
+        size = field.function_space.dofmap.index_map_bs
+        if where == "nodes":
+            return self.disc.node_values(form, size)
+        values = np.zeros_like(field.x.array)
+        _dolfinx.add_vector(values, form)
+        return values.reshape(-1, size)
 
     def save(self) -> dict[str, Array]:
         """The remembered values in the order of the net, on every rank. Collective."""
@@ -126,15 +129,3 @@ class Histories:
                 field.x.array[:] = disc.cell_field(field.function_space, values).x.array
             else:
                 field.x.array[:] = disc.crossing_field(field.function_space, values).x.array
-
-    def _lengths(self) -> Array:
-        """Tow length of the owned cells at each local node [mm]."""
-        if self._node_length is None:
-            disc = self.disc
-            local = np.zeros(len(disc.local_nodes))
-            count = len(disc.owned_cells)
-            blocks = _dolfinx.cell_dofs(disc.tows.space)[:count]
-            half = disc.net.lengths[disc.owned_cells] / 2.0
-            np.add.at(local, blocks.ravel(), np.repeat(half, 2))
-            self._node_length = local
-        return self._node_length

@@ -21,11 +21,12 @@ from ..mechanics.fields import ConnectorFields, TowFields
 from ..mechanics.section_laws import with_viscosity
 from ..mechanics.terms import Term, work_term
 from ..mechanics.tools import Tool
+from .contacts import ContactLaw, Contacts
 from .discretisation import BLOCK, Discretisation
 from .generalised_alpha import GeneralisedAlpha, backward_difference
 from .history import Histories
 from .newton import Newton
-from .parts import ContactLaw, Contacts, Crossings, CrossoverLaw
+from .parts import Crossings, CrossoverLaw
 from .sections import SectionLawName, diagonals, elastic_section
 from .snapshot import Snapshot
 from .system import System
@@ -58,8 +59,8 @@ class Support:
 class Model:
     """The paper's model of a net, on a communicator.
 
-    ``mass`` holds (ρA, ρI about the directors) of each cell of the net, (n_cells, 4) [tonne/mm,
-    tonne mm].
+    ``stiffness`` is the diagonal of each cell's section, (n_cells, 6) [N, N mm²], ``mass`` holds
+    (ρA, ρI about the directors), (n_cells, 4) [tonne/mm, tonne mm].
 
     Args:
         net: the net, on every rank.
@@ -116,6 +117,7 @@ class Model:
         kind = (net.tow_family if tow_section is None else tow_section)[net.cell_tow]
         stiffness = diagonals(sections)[kind]
         mass = self.mass = np.array([s.mass() for s in sections])[kind]
+        self.stiffness = stiffness
         # Softest of twist and bending over the cell length squared [N].
         self._bending = stiffness[:, 3:].min(axis=1) / net.lengths**2
         self.net, self.comm = net, comm
@@ -218,6 +220,7 @@ class Model:
             self.fixed,
             force_tolerance=force_tolerance,
             limit=limit,
+            settle=self.firm_up,
             dyads=[tool.dyad for tool in pressed],
         )
 
@@ -300,6 +303,10 @@ class Model:
         rate = turn * inertia.max(axis=1) / (inertia.min(axis=1) + self._bending)
         self.system.gyroscopic = bool(rate.max() > NEGLIGIBLE_RATE)
 
+    def firm_up(self) -> str:
+        """Stiffen the contact where tows have sunk in too deep; says where. Collective."""
+        return "" if self.contacts is None else self.contacts.firm_up()
+
     def remember(self) -> None:
         """Update what the next step starts from, with the increment still in the fields."""
         self.histories.update()
@@ -325,6 +332,10 @@ class Model:
         if self.contacts is None:
             raise KeyError(name)
         return self.contacts.place(name)
+
+    def gaps(self) -> dict[str, Array]:
+        """Distance of each node from each tool [mm], negative inside, (n_nodes,), on every rank."""
+        return {} if self.contacts is None else self.contacts.gaps()
 
     def weight_work(self) -> float:
         """Work of gravity over the step whose increment stands in the fields [N mm]."""

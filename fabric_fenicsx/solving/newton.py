@@ -32,6 +32,10 @@ RUNAWAY = 1e2
 #: last, would be below this share of the tolerance: the tangent has then hardly changed.
 ENOUGH = 0.01
 
+#: Residual over the tolerance below which what the iteration has found is looked at: the rest of
+#: the way would be lost where the system is then changed.
+NEAR = 1e4
+
 #: Iterations within which the smallest residual must have halved, or the step has failed.
 PATIENCE = 4
 
@@ -56,6 +60,8 @@ class Newton:
         force_tolerance: residual norm [N, N mm] at which the nodes are in balance.
         limit: iterations after which a step has failed.
         prefix: PETSc options prefix, the same on all ranks.
+        settle: called near convergence; changes the system where its state does not suit and says
+            what did not, in words.
         dyads: parts c rᵀ/s of the tangent beside the assembled matrix, to be taken off it; each
             gives (c, r, s), or None where it has nothing at this iterate.
     """
@@ -68,6 +74,7 @@ class Newton:
         force_tolerance: float,
         limit: int = 25,
         prefix: str = "fabric_",
+        settle: Callable[[], str] = lambda: "",
         dyads: Sequence[Callable[[], Dyad | None]] = (),
     ) -> None:
         self.system = system
@@ -76,6 +83,7 @@ class Newton:
         self.iterations = 0
         self.factorisations = 0
         self.solve_seconds = 0.0
+        self._settle = settle
         self._dyads = list(dyads)
         self._prefix = prefix
         net = system.net
@@ -92,7 +100,7 @@ class Newton:
         self._target = np.zeros(len(fixed))
         self._history: list[float] = []
         self._fresh = True
-        self._refused = ""
+        self._refused = self._unsettled = ""
         self._symmetric = False
         self._solvers: dict[bool, PETSc.SNES] = {}
         self._whole: dict[bool, PETSc.Mat] = {}
@@ -150,7 +158,7 @@ class Newton:
         self._target = targets
         self._history = []
         self._fresh = True
-        self._refused = ""
+        self._refused = self._unsettled = ""
         start = perf_counter()
         before = self.system.assemble_seconds
         snes = self.snes
@@ -209,7 +217,8 @@ class Newton:
         if reason == reasons.DIVERGED_LINEAR_SOLVE:
             return "the tangent could not be factorised"
         if reason == reasons.DIVERGED_MAX_IT:
-            return f"no convergence in {self.limit} iterations"
+            unsettled = f"; {self._unsettled}" if self._unsettled else ""
+            return f"no convergence in {self.limit} iterations{unsettled}"
         return "the iteration diverges"
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, F: PETSc.Vec) -> None:
@@ -221,6 +230,12 @@ class Newton:
             return
         self._fresh = False
         self.residual(x, F, self._target)
+        if F.norm() < NEAR * self.force_tolerance:
+            self._unsettled = self._settle()
+            if self._unsettled:
+                self.residual(x, F, self._target)
+                # Convergence is judged from here on.
+                self._history = self._history[:1]
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         if not self._nearly_done():
@@ -276,12 +291,14 @@ class Newton:
         self._step = norms[1] if iteration else float("inf")
         if not np.isfinite(residual):
             return NOT_A_NUMBER
-        if iteration > 0 and residual < self.force_tolerance:
+        settled = not self._unsettled
+        if iteration > 0 and residual < self.force_tolerance and settled:
             return int(reasons.CONVERGED_FNORM_ABS)
         history = self._history
-        if iteration > 3 and residual > RUNAWAY * max(history[:2]):
+        since = len(history) - 1
+        if since > 3 and residual > RUNAWAY * max(history[:2]):
             return int(reasons.DIVERGED_DTOL)
-        if iteration > PATIENCE and min(history[-PATIENCE:]) > min(history[1:-PATIENCE]) / 2.0:
+        if since > PATIENCE and min(history[-PATIENCE:]) > min(history[1:-PATIENCE]) / 2.0:
             return int(reasons.DIVERGED_DTOL)
         if iteration >= self.limit:
             return int(reasons.DIVERGED_MAX_IT)

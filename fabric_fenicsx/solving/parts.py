@@ -1,8 +1,8 @@
-"""Crossings and contact of a model: from their laws to terms, constants and histories."""
+"""Crossings of a model: from their laws to terms, constants and histories."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,18 +12,16 @@ from ufl import variable
 
 from .. import _dolfinx
 from .._dolfinx import Function
-from ..mechanics import contact, crossover, slip
+from ..mechanics import crossover, slip
 from ..mechanics.laws.dashpots import LinearDashpot
 from ..mechanics.laws.law import Crossing, CrossingLaw
 from ..mechanics.laws.springs import PolynomialSpring
-from ..mechanics.terms import Term, energy_term, work_term
-from ..mechanics.tools import SampledTool, Tool
-from .discretisation import BLOCK, Discretisation
+from ..mechanics.terms import Term, energy_term
+from .discretisation import Discretisation
 from .generalised_alpha import backward_difference
 from .history import Histories
-from .pressed import PressedTool
 
-__all__ = ["ContactLaw", "Contacts", "Crossings", "CrossoverLaw"]
+__all__ = ["Crossings", "CrossoverLaw"]
 
 Array = npt.NDArray[np.float64]
 
@@ -49,29 +47,6 @@ class CrossoverLaw:
     alignment: float
     laws: tuple[CrossingLaw, ...] = ()
     slip_limit: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ContactLaw:
-    """Pressure and friction between tows and tools, see mechanics.contact.
-
-    Attributes:
-        stiffness: force per tow length and penetration [N/mm²].
-        layer: penetration over which the stiffness builds up [mm].
-        friction: Coulomb's μ [-]; 0 leaves friction out.
-        stick_stiffness: friction force per tow length and stretch of the stick [N/mm²].
-        frictionless: names of tools on which there is none, as oiled ones.
-    """
-
-    stiffness: float
-    layer: float
-    friction: float = 0.0
-    stick_stiffness: float = 0.5
-    frictionless: tuple[str, ...] = ()
-
-    def rubs(self, tool: str) -> bool:
-        """Whether there is friction on a tool."""
-        return self.friction > 0.0 and tool not in self.frictionless
 
 
 class Crossings:
@@ -204,130 +179,3 @@ def _named(laws: Sequence[CrossingLaw]) -> list[tuple[str, CrossingLaw]]:
     counts = [kinds[: i + 1].count(kind) for i, kind in enumerate(kinds)]
     names = [kind if n == 1 else f"{kind} {n}" for kind, n in zip(kinds, counts, strict=True)]
     return list(zip(names, laws, strict=True))
-
-
-class Contacts:
-    """Terms of the contact with tools, and the tools' motion.
-
-    Args:
-        disc: the discretised net.
-        tools: what the fabric touches.
-        law: how it touches.
-        histories: where the friction's memory goes.
-        pressed: force [N] at a time that pushes a tool downwards, by its name; the height of such a
-            tool follows from balance, its path says where it starts.
-
-    Raises:
-        ValueError: a force on a tool, or one without friction, that there is not.
-    """
-
-    def __init__(
-        self,
-        disc: Discretisation,
-        tools: Sequence[Tool],
-        law: ContactLaw,
-        histories: Histories,
-        pressed: Mapping[str, Callable[[float], float]],
-    ) -> None:
-        unknown = {*pressed, *law.frictionless} - {tool.name for tool in tools}
-        if unknown:
-            raise ValueError(f"no tool is called {', '.join(sorted(unknown))}")
-        self.tools = list(tools)
-        self.pressed: dict[str, PressedTool] = {}
-        self.terms: list[Term] = []
-        self.frictional = {tool.name for tool in tools if law.rubs(tool.name)}
-        self._places: list[Any] = []
-        self._shifts: list[Any] = []
-        self._samples: list[tuple[SampledTool, Any, Function]] = []
-        self._disc = disc
-        tows = disc.tows
-
-        def number(value: Any) -> Any:
-            return _dolfinx.constant(tows.mesh, value)
-
-        pressure = (number(law.stiffness), number(law.layer))
-        friction = (number(law.friction), number(law.stick_stiffness))
-        for tool in self.tools:
-            place = number(tuple(tool.path(0.0)))
-            shift = number((0.0, 0.0, 0.0))
-            numbers = {key: number(value) for key, value in tool.numbers().items()}
-            if isinstance(tool, SampledTool):
-                numbers["sample"] = Function(_dolfinx.lagrange(tows.mesh, 13))
-                self._samples.append((tool, place, numbers["sample"]))
-            self._places.append(place)
-            self._shifts.append(shift)
-
-            def distance(
-                x: Any, tool: Tool = tool, place: Any = place, numbers: dict[str, Any] = numbers
-            ) -> Any:
-                return tool.distance(x, place, numbers)
-
-            energy = contact.contact_energy(tows, distance, *pressure)
-            self.terms.append(energy_term(tool.name, tows, energy))
-            traction = None
-            if tool.name in self.frictional:
-                traction_n = Function(tows.u_n.function_space)
-                traction = contact.friction_traction(
-                    tows, distance, pressure, friction, traction_n, shift
-                )
-                work = contact.traction_work(tows, traction)
-                loss = contact.traction_loss(tows, traction, shift)
-                self.terms.append(work_term(f"{tool.name} friction", tows, work, loss=loss))
-                histories.add(f"{tool.name}: traction", "nodes", traction_n, traction)
-            if tool.name in pressed:
-                self.pressed[tool.name] = PressedTool(
-                    disc,
-                    pressed[tool.name],
-                    energy,
-                    traction,
-                    place=place,
-                    shift=shift,
-                    moved=self._sample,
-                    reach=law.layer,
-                )
-                histories.add_numbers(f"{tool.name}: height", self.pressed[tool.name].height_n)
-
-    def refresh(self) -> None:
-        """Bring everything up to date that depends on the increment otherwise than by UFL."""
-        self._sample()
-        for tool in self.pressed.values():
-            tool.balance()
-
-    def stand(self, time: float) -> None:
-        """Put the tools where they were when the step that ended at this time was accepted."""
-        for tool, place in zip(self.tools, self._places, strict=True):
-            place.value[:] = tool.path(time)
-        for pressed in self.pressed.values():
-            pressed.stand(time)
-
-    def advance(self) -> None:
-        """The step is accepted."""
-        for tool in self.pressed.values():
-            tool.advance()
-
-    def place(self, name: str) -> Array:
-        """Where a tool's reference point is [mm], (3,)."""
-        names = [tool.name for tool in self.tools]
-        return np.array(self._places[names.index(name)].value)
-
-    def _sample(self) -> None:
-        """Sample the tools that are not analytic at the nodes' places, ghosts included."""
-        if not self._samples:
-            return
-        disc, tows = self._disc, self._disc.tows
-        moved = tows.u_n.x.array.reshape(-1, 3) + tows.w.x.array.reshape(-1, BLOCK)[:, :3]
-        x = disc.net.points[disc.local_nodes] + moved
-        upper = np.triu_indices(3)
-        for tool, place, field in self._samples:
-            d, n, H = tool.sample(x - place.value)
-            values = field.x.array.reshape(-1, 13)
-            values[:, 0], values[:, 1:4], values[:, 4:10] = d, n, H[:, upper[0], upper[1]]
-            values[:, 10:] = x
-
-    def set_time(self, start: float, end: float) -> None:
-        """Move the tools to their places at the end of the step."""
-        for tool, place, shift in zip(self.tools, self._places, self._shifts, strict=True):
-            place.value[:] = tool.path(end)
-            shift.value[:] = np.subtract(tool.path(end), tool.path(start))
-        for pressed in self.pressed.values():
-            pressed.stand(end)

@@ -16,6 +16,7 @@ from pydantic import Field
 
 from ...inputs.groups import Keys, Positive
 from ...rigs.cases import TowKeys
+from ...rigs.common import KG_M2, TONNE, section
 
 __all__ = [
     "FILE",
@@ -42,6 +43,10 @@ class MeasuredTowKeys(Keys):
     height_mm: Positive = Field(0.04, description="height of the section across the sheet")
     density_kg_mm3: Positive = Field(7.0e-6, description="density")
     C1_MPa: Positive = Field(60000.0, description="Neo-Hookean constant; E = 6 C1")
+    bending_in_plane_Nmm: Positive | None = Field(
+        9.5,
+        description="E I in the sheet's plane per width: fibres slide; null: that of a solid strip",
+    )
 
 
 class FabricKeys(Keys):
@@ -117,19 +122,35 @@ class Measurement:
 
 
 def fabric_keys(tow: TowKeys, warp_spacing: float, weft_spacing: float) -> FabricKeys:
-    """The fabric of a case: its tows, and what two families of them weigh.
+    """The fabric of a case: its tows, and what the two families of them weigh.
+
+    The tow is the rectangle of the case's width that stretches, bends out of the plane and weighs
+    as the case's section does.
 
     Args:
         tow: of the case.
         warp_spacing: of the warp tows [mm].
         weft_spacing: of the weft tows [mm].
     """
-    per_area = 1.0 / warp_spacing + 1.0 / weft_spacing
-    # kg/mm² to kg/m²
-    density = 1e6 * tow.density_kg_mm3 * tow.width_mm * tow.height_mm * per_area
-    keys = {name: getattr(tow, name) for name in MeasuredTowKeys.model_fields}
+    warp, weft = (section(tow, spacing) for spacing in (warp_spacing, weft_spacing))
+    density = warp.mass()[0] / warp_spacing + weft.mass()[0] / weft_spacing
+    EA, _, _, _, EI_out, _ = warp.stiffness()
+    width, height = tow.width_mm, float(np.sqrt(12.0 * EI_out / EA))
+    if tow.per_width_mm is not None:
+        width *= warp_spacing / tow.per_width_mm
+    given = tow.stiffness and tow.stiffness.bending_in_plane_Nmm
     return FabricKeys(
-        areal_density_kg_m2=round(density, 6),
+        areal_density_kg_m2=round(KG_M2 * density, 6),
         tow_spacing_mm=warp_spacing,
-        tow=MeasuredTowKeys(**keys),
+        tow=MeasuredTowKeys(
+            width_mm=_rounded(width),
+            height_mm=_rounded(height),
+            density_kg_mm3=_rounded(warp.mass()[0] / TONNE / (width * height)),
+            C1_MPa=_rounded(EA / (6.0 * width * height)),
+            bending_in_plane_Nmm=given,
+        ),
     )
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.10g}")

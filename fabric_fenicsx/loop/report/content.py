@@ -6,7 +6,6 @@ by, what was left out, what cannot be told apart, what to measure next) is for t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...inputs.keys import UNITS, one_of
+from ...output.page import finite
 from ..inference.criteria import CRITERIA
 from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Effect, Parameter, Variant
@@ -114,8 +114,8 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
         ],
         "notes": list(d.notes),
     }
-    finite: dict[str, Any] = _finite(content)
-    return finite | {"headline": headline(finite)}
+    numbers: dict[str, Any] = finite(content)
+    return numbers | {"headline": headline(numbers)}
 
 
 def combined_report(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -244,14 +244,3 @@ def _left_out(d: Diagnosis, measurements: Sequence[Measurement]) -> dict[str, An
         if count:
             unknown.append(place | {"readings": count, "of": len(own)})
     return {"outliers": outliers, "not_comparable": unknown}
-
-
-def _finite(value: Any) -> Any:
-    """The same with plain Python numbers, None for those that JSON cannot say."""
-    if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(entry) for entry in value]
-    if isinstance(value, (float, np.floating)):
-        return float(value) if math.isfinite(value) else None
-    return value

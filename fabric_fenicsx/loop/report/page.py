@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -11,23 +9,20 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import pandas as pd
-from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ... import __version__
 from ...errors import InputError
 from ...output.files import write_text
+from ...output.page import inline, number, rendered, save_figure
 from ..inference.diagnosis import Diagnosis
 from .content import parameter_unit
 from .figures import candidates_figure, data_figure, law_figure, residual_figure, shown_model
 from .law_table import law_table
 
 __all__ = ["write_report"]
-
-DOTS = 160  # per inch, of the figures that are files
 
 
 def write_report(
@@ -60,10 +55,7 @@ def _write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]
         law = law_table(diagnosis, model[0] if model is not None else diagnosis.baseline)
         figures = _figures(diagnosis, report, law)
         for name, (figure, _) in figures.items():
-            # Laid out once for both formats.
-            figure.draw_without_rendering()
-            figure.set_layout_engine("none")
-            figure.savefig(folder / f"{report['test']}_{name}.png", dpi=DOTS)
+            save_figure(figure, folder / f"{report['test']}_{name}.png")
         if law is not None:
             law.to_csv(folder / f"{report['test']}_law.csv", index=False)
         sections.append(
@@ -71,29 +63,16 @@ def _write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]
                 "report": report,
                 "unit": parameter_unit(report["error"]["quantity"]),
                 "figures": {
-                    name: {"source": _inline(figure, name), "caption": caption}
+                    name: {"source": inline(figure, name), "caption": caption}
                     for name, (figure, caption) in figures.items()
                 },
                 "rows": _candidate_rows(report),
                 "parameters": _parameter_rows(report),
             }
         )
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    environment.filters |= {"number": number, "chance": chance}
     template = files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
-    text = environment.from_string(template).render(sections=sections, version=__version__)
+    text = rendered(template, {"chance": chance}, sections=sections, version=__version__)
     write_text(folder / "report.html", text)
-
-
-def number(value: float | None, digits: int = 3) -> Markup:
-    """A number for a table; a dash where there is none."""
-    if value is None:
-        return Markup("&ndash;")
-    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
-        decimals = digits - 1 - (math.floor(math.log10(abs(value))) if value else 0)
-        return Markup(f"{value:.{max(decimals, 0)}f}".replace("-", "−"))
-    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
-    return Markup(f"{mantissa} × 10<sup>{int(power)}</sup>".replace("-", "−"))
 
 
 def chance(value: float | None) -> Markup:
@@ -136,14 +115,6 @@ def _run_names(report: Mapping[str, Any]) -> list[str]:
         for m in report["measurements"]
         for run in m["runs"]
     ]
-
-
-def _inline(figure: Figure, name: str) -> str:
-    """A figure as a data URI: as an image of its own, its ids clash with no other's."""
-    buffer = io.BytesIO()
-    with mpl.rc_context({"svg.hashsalt": name}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
 def _candidate_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:

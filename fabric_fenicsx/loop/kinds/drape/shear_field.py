@@ -140,6 +140,7 @@ def drape_case(
             "height_mm": b,
             "density_kg_mm3": 1e-6 * fabric.areal_density_kg_m2 * s / (2.0 * a * b),
             "C1_MPa": C1,
+            "stiffness": {"bending_in_plane_Nmm": fabric.tow.bending_in_plane_Nmm},
         },
         "crossover": {"k1_N_mm": shear.k1, "k3_N_mm": shear.k3, "dashpot_N_s_mm": shear.c1},
     }
