@@ -74,6 +74,7 @@ from .output.surfaces import RevolvedSurface as RevolvedSurface
 from .output.surfaces import TriangleSurface as TriangleSurface
 from .output.weaves import draw_weave as draw_weave
 from .rigs.common import mesh as mesh
+from .rigs.convergence import converge as converge
 from .rigs.drape import symmetry_planes as symmetry_planes
 from .rigs.kinematic import kinematic_net as kinematic_net
 from .rigs.load import load_case as load_case

@@ -6,9 +6,11 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -20,6 +22,7 @@ __all__ = [
     "searching",
     "show_quantities",
     "summarise",
+    "summarise_convergence",
     "summarise_diagnosis",
 ]
 
@@ -165,6 +168,43 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
     console.print(f"report in {folder / 'report.html'}", soft_wrap=True)
 
 
+def summarise_convergence(study: dict[str, Any], folder: Any) -> None:
+    """Print changes, orders and errors of a convergence study, family by family."""
+    console = Console(highlight=False)
+    for family in study["families"]:
+        done = [level["value"] for level in family["levels"] if level["completed"]]
+        for level in family["levels"]:
+            if not level["completed"]:
+                console.print(f"{level['folder']}: {level['stopped_because']}", soft_wrap=True)
+        steps = [f"{a:g} → {b:g}" for a, b in pairwise(done)]
+        title = escape(f"{family['varied']}: root mean square (largest) changes")
+        table = Table("", *steps, "order", "error", "±", title=title, title_justify="left")
+        for row in family["regions"]:
+            pairs = zip(row["changes_deg"], row["largest_deg"], strict=True)
+            changes = [f"{rms:.3f} ({abs(largest):.2f})" for rms, largest in pairs]
+            table.add_row(escape(f"shear, {row['region']} [°]"), *changes, *_estimated(row))
+        for row in family["quantities"]:
+            changes = [f"{b - a:+.3f}" for a, b in pairwise(row["values"])]
+            table.add_row(escape(row["name"]), *changes, *_estimated(row))
+        if table.row_count:
+            console.print(table)
+    total = study["total"]
+    found = total["regions"]["all"]
+    if found is not None:
+        console.print(
+            f"shear angle of the case: error {found['error']:.2f}° rms, with its factors of safety "
+            f"{found['uncertainty']:.2f}°; {total['combination']} ({', '.join(total['of'])})",
+            soft_wrap=True,
+        )
+    console.print(f"results in {folder}", soft_wrap=True)
+
+
+def _estimated(row: dict[str, Any]) -> tuple[str, ...]:
+    order = row["basis"] if row["order"] is None else f"{row['order']:.2f}"
+    numbers = (row["error"], row["uncertainty"])
+    return order, *("-" if number is None else f"{number:.3f}" for number in numbers)
+
+
 def summarise(result: dict[str, Any], folder: Any) -> None:
     """Print the quantities of a result, and lists of them as tables of their own."""
     console = Console(highlight=False)
@@ -175,6 +215,12 @@ def summarise(result: dict[str, Any], folder: Any) -> None:
         soft_wrap=True,
     )
     show_quantities(console, result.get("quantities", {}))
+    error = result.get("discretisation_error")
+    if error is not None:
+        console.print(
+            f"error of the {error['of']}: about {error['estimate_deg']:.2g}°, by {error['source']}",
+            soft_wrap=True,
+        )
 
 
 def show_quantities(console: Console, quantities: dict[str, Any]) -> None:

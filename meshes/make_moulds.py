@@ -1,7 +1,9 @@
 """Write the moulds of the demos as STL files, in mm: `python meshes/make_moulds.py`.
 
-A punch has its highest point at z = 0 and rises into the sheet above it. A plate lies with its face
-in z = 0, below the sheet; its hole has the punch's outline, a gap wider, and a rounded edge.
+A punch has its highest point at z = 0 and rises into the sheet above it; the file that ends in
+`_punch` is the same turned over, to press downwards as that of a drape case does. A plate lies with
+its face in z = 0, below the sheet; its hole has the punch's outline, a gap wider, and a rounded
+edge.
 """
 
 from pathlib import Path
@@ -100,6 +102,11 @@ def box(curve, edge, height=60.0):
     return quilt(swept(curve, np.vstack([[[edge, -height]], rounding])), close=False)
 
 
+def turned_over(surface):
+    """The mirror image in z = 0."""
+    return Triangles(surface.points * [1.0, 1.0, -1.0], surface.cells[:, ::-1])
+
+
 def main():
     """Write all of them."""
     racetrack = outline([[-40.0, 0.0], [40.0, 0.0]], 17, 4.0)
@@ -110,6 +117,7 @@ def main():
         "box": box(square, 20.0),
         "box_plate": plate(square, 25.0),
     }
+    moulds |= {f"{name}_punch": turned_over(moulds[name]) for name in ("double_dome", "box")}
     for name, surface in moulds.items():
         assert surface.closed and surface.volume > 0.0, name
         write_stl(FOLDER / f"{name}.stl", surface, name)

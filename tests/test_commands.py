@@ -62,8 +62,14 @@ def test_the_case_kept_with_a_run_is_the_case(path, tmp_path):
     kept = tmp_path / "case.yaml"
     kept.write_text(case_text(case, DEMOS), encoding="utf-8")
     again = load_case(kept)
-    assert Path(again.mesh).samefile(DEMOS / case.mesh)
-    assert again.model_copy(update={"mesh": case.mesh}) == case
+    files = {
+        key: name
+        for key in ("mesh", "punch_stl", "die_stl")
+        if (name := getattr(case, key, None)) is not None
+    }
+    for key, name in files.items():
+        assert Path(getattr(again, key)).samefile(DEMOS / name)
+    assert again.model_copy(update=files) == case
 
 
 def test_check_counts_what_will_be_run(tmp_path, capsys, monkeypatch):

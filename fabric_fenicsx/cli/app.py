@@ -11,6 +11,7 @@ import typer
 from .. import __version__
 from .animate import animate
 from .check import check
+from .converge import converge
 from .diagnose import diagnose
 from .doctor import doctor
 from .export import export
@@ -56,6 +57,10 @@ EXAMPLES: dict[Callable[..., None], list[str]] = {
     run: ["run demos/drape.yaml", "run demos/drape.yaml --out results/fine --set tow.C1_MPa=3e4"],
     new: ["new drape", "new picture_frame mine.yaml"],
     check: ["check demos/drape.yaml", "check demos/drape.yaml --set sheet.subdivisions=4"],
+    converge: [
+        "converge demos/drape.yaml",
+        "converge demos/drape.yaml --only spacing,cells --resume",
+    ],
     keys: ["keys drape", "keys --markdown > keys.md"],
     kinematic: [
         "kinematic demos/drape.yaml",

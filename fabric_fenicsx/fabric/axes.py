@@ -35,8 +35,9 @@ class TowAxes:
 
     Attributes:
         net: the net.
-        nodes: whose places, for the warp and the weft of each crossing, (n_crossings, 2, 5).
-        weights: of their coordinates [1/mm], (n_crossings, 2, 5, 3).
+        nodes: whose places, for the warp and the weft of each crossing, (n_crossings, 2, m), with m
+            = 2 reach + 1.
+        weights: of their coordinates [1/mm], (n_crossings, 2, m, 3).
     """
 
     net: Net
@@ -44,7 +45,7 @@ class TowAxes:
     weights: Floats
 
     @classmethod
-    def of(cls, net: Net, symmetry: Sequence[int] = ()) -> TowAxes:
+    def of(cls, net: Net, symmetry: Sequence[int] = (), reach: int = REACH) -> TowAxes:
         """Those of a net.
 
         Near a free end of a tow fewer places count, the tow's end among them. In a plane of
@@ -53,10 +54,11 @@ class TowAxes:
         Args:
             net: the net.
             symmetry: axes whose planes through the origin mirror the net: 0 for x = 0, 1 for y = 0.
+            reach: places to either side of a crossing; with 1 of second order in the spacing.
         """
-        count = len(net.crossings)
-        nodes = np.zeros((count, 2, 2 * REACH + 1), dtype=np.int64)
-        weights = np.zeros((count, 2, 2 * REACH + 1, 3))
+        count, size = len(net.crossings), 2 * reach + 1
+        nodes = np.zeros((count, 2, size), dtype=np.int64)
+        weights = np.zeros((count, 2, size, 3))
         tow = np.zeros(len(net.points), dtype=np.int64)
         tow[net.cells.ravel()] = np.repeat(net.cell_tow, 2)
         for side in (0, 1):
@@ -66,7 +68,7 @@ class TowAxes:
                 if len(own):
                     line = net.crossings[own, side]
                     ends = net.ends[tow[line[0]]]
-                    nodes[own, side], weights[own, side] = _on_tow(net, line, ends, symmetry)
+                    nodes[own, side], weights[own, side] = _on_tow(net, line, ends, symmetry, reach)
         return cls(net, nodes, weights)
 
     def at(self, displacement: Floats) -> Floats:
@@ -83,9 +85,11 @@ class TowAxes:
         return slopes / np.linalg.norm(slopes, axis=-1, keepdims=True)
 
 
-def tow_axes(net: Net, displacement: Floats, *, symmetry: Sequence[int] = ()) -> Floats:
+def tow_axes(
+    net: Net, displacement: Floats, *, symmetry: Sequence[int] = (), reach: int = REACH
+) -> Floats:
     """Unit tangents of warp and weft at each crossing of a net, see TowAxes."""
-    return TowAxes.of(net, symmetry).at(displacement)
+    return TowAxes.of(net, symmetry, reach).at(displacement)
 
 
 def axes_shear(axes: Floats) -> Floats:
@@ -100,9 +104,9 @@ def axes_shear(axes: Floats) -> Floats:
 
 
 def _on_tow(
-    net: Net, line: Integers, ends: Integers, symmetry: Sequence[int]
+    net: Net, line: Integers, ends: Integers, symmetry: Sequence[int], reach: int
 ) -> tuple[Integers, Floats]:
-    """Nodes (n, 5) and weights (n, 5, 3) of the n crossings of a tow, in its order."""
+    """Nodes (n, m) and weights (n, m, 3) of the n crossings of a tow, in its order."""
     place = net.points[line]
     s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
     node, at, sign = list(line), list(s), [np.ones(3)] * len(line)
@@ -122,7 +126,7 @@ def _on_tow(
             arc = s if first else s[::-1]
             images = [(n, 2.0 * start - a) for n, a in zip(inner, arc, strict=True)]
             beyond = [(n, a, flip, True) for n, a in images if abs(a - start) > 0.0]
-            more = beyond[:REACH]
+            more = beyond[:reach]
         elif gap > 0.0:
             more = [(end, start, np.ones(3), False)]
         for n, a, flips, counts in more:
@@ -134,11 +138,11 @@ def _on_tow(
     offset = next(k for k, a in enumerate(at) if a == s[0] and node[k] == line[0])
     stations, arc = np.array(node), np.array(at)
     signs, counted = np.array(sign), np.array(whole)
-    nodes = np.repeat(line[:, None], 2 * REACH + 1, axis=1)
-    weights = np.zeros((len(line), 2 * REACH + 1, 3))
+    nodes = np.repeat(line[:, None], 2 * reach + 1, axis=1)
+    weights = np.zeros((len(line), 2 * reach + 1, 3))
     for k in range(len(line)):
         i = offset + k
-        low, high = i - REACH, i + REACH + 1
+        low, high = i - reach, i + reach + 1
         if low < 0 or high > len(arc) or not counted[low:high].all():
             low = max(min(i - 1, len(arc) - 3), 0)
             high = min(low + 3, len(arc))

@@ -25,7 +25,7 @@ from fabric_fenicsx.output.files import write_text
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
 from fabric_fenicsx.solving.snapshot import Snapshot
 
-__all__ = ["FibreMap", "fibre_map"]
+__all__ = ["FibreMap", "fibre_map", "nearest_tool"]
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -116,7 +116,7 @@ def fibre_map(net: Net, snapshot: Snapshot, tools: Sequence[TriangleSurface] = (
     mould, moved = [""] * len(flat), np.zeros(len(flat))
     if tools and pressed.any():
         touched = np.flatnonzero(pressed)
-        nearest, on_tool, normals = _nearest(tools, place[touched])
+        nearest, on_tool, normals = nearest_tool(tools, place[touched])
         moved[touched] = np.linalg.norm(on_tool - place[touched], axis=1)
         place[touched] = on_tool
         for at, k in zip(touched.tolist(), nearest.tolist(), strict=True):
@@ -143,7 +143,7 @@ def fibre_map(net: Net, snapshot: Snapshot, tools: Sequence[TriangleSurface] = (
     )
 
 
-def _nearest(tools: Sequence[TriangleSurface], places: Array) -> tuple[Integers, Array, Array]:
+def nearest_tool(tools: Sequence[TriangleSurface], places: Array) -> tuple[Integers, Array, Array]:
     """Which tool is nearest to each place, its nearest point and its unit normal there."""
     best = np.full(len(places), np.inf)
     which = np.zeros(len(places), dtype=np.int64)

@@ -85,7 +85,12 @@ class DrapeCase(Case):
         "downwards with its lowest point first",
     )
     punch_cell_mm: Positive = Field(
-        1.0, description="grid of the distance from that punch; its edges are rounded over a cell"
+        1.0, description="grid of the distance from tools of files; edges are rounded over a cell"
+    )
+    die_stl: str | None = Field(
+        None,
+        description="a die of another shape: STL file in mm, its face in z = 0 below the sheet; "
+        "turned over it is the holder",
     )
     hole_radius_mm: Positive = Field(80.0, description="of die and holder")
     edge_radius_mm: Positive = Field(10.0, description="rounding of the holes' edges")
@@ -168,11 +173,12 @@ def check(case: DrapeCase) -> None:
 
 
 def read_files(case: DrapeCase, base: Path) -> None:
-    """Read the file of the punch."""
+    """Read the files of the tools."""
     from ..geometry.triangles import read_stl
 
-    if case.punch_stl is not None:
-        read_stl(base / case.punch_stl)
+    for file in (case.punch_stl, case.die_stl):
+        if file is not None:
+            read_stl(base / file)
 
 
 def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
@@ -180,10 +186,10 @@ def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
 
     Args:
         case: the case.
-        base: folder that the path of the punch's file counts from.
+        base: folder that paths of the tools' files count from.
 
     Raises:
-        InputError: the file of the punch cannot be read or is no surface with two sides.
+        InputError: a tool's file cannot be read or is no surface with two sides.
     """
     from ..geometry.distance import DistanceGrid
     from ..geometry.triangles import read_stl
@@ -201,13 +207,20 @@ def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
     def holder(time: float) -> tuple[float, float, float]:
         return x, y, case.holder_gap_start_mm + closing * min(time / case.holder_closing_s, 1.0)
 
-    hole, edge = case.hole_radius_mm, case.edge_radius_mm
+    def die(time: float) -> tuple[float, float, float]:
+        return x, y, 0.0
+
     cell = case.punch_cell_mm
+    first: Tool = Sphere("punch", punch, case.punch_radius_mm)
+    if shape is not None:
+        first = Mould("punch", punch, shape, DistanceGrid.of(shape, cell, 3.0 * cell))
+    if case.die_stl is not None:
+        plate = Mould.from_stl("die", die, base / case.die_stl, cell=cell, margin=3.0 * cell)
+        return [first, plate, plate.turned_over("holder", holder)]
+    hole, edge = case.hole_radius_mm, case.edge_radius_mm
     return [
-        Sphere("punch", punch, case.punch_radius_mm)
-        if shape is None
-        else Mould("punch", punch, shape, DistanceGrid.of(shape, cell, 3.0 * cell)),
-        HoledPlate("die", lambda time: (x, y, 0.0), hole, edge, 1.0),
+        first,
+        HoledPlate("die", die, hole, edge, 1.0),
         HoledPlate("holder", holder, hole, edge, -1.0),
     ]
 
@@ -230,6 +243,16 @@ def symmetry_planes(net: Net) -> list[Support]:
         nodes = np.flatnonzero(np.abs(net.points[:, axis]) < 1e-9 * np.ptp(net.points))
         planes.append(Support(nodes, held))
     return planes
+
+
+def mirrors(case: DrapeCase) -> tuple[int, ...]:
+    """Axes whose planes mirror what is modelled."""
+    return (0, 1) if case.symmetry == "quarter" else ()
+
+
+def rim(case: DrapeCase) -> float | None:
+    """Radius at which the die's face begins to be flat [mm]; None where its hole is not round."""
+    return None if case.die_stl is not None else case.hole_radius_mm + case.edge_radius_mm
 
 
 def contact_law(keys: ContactKeys) -> ContactLaw:
@@ -265,7 +288,7 @@ def build(case: DrapeCase, session: Session) -> Model:
         contact_law=contact_law(case.contact),
         pressed=pressed(case),
         supports=symmetry_planes(net) if case.symmetry == "quarter" else (),
-        symmetry=(0, 1) if case.symmetry == "quarter" else (),
+        symmetry=mirrors(case),
         **({} if weave is None else crossing_weights(weave, keys, net, session.base)),
     )
 
@@ -331,6 +354,7 @@ def run(case: DrapeCase, session: Session) -> dict[str, Any]:
 def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dict[str, Any]:
     """Tables, pictures and quantities of the last accepted step."""
     from .common import extend, lowest
+    from .discretisation_error import recovered_error
     from .health import drape_health
 
     quantities: dict[str, Any] = {}
@@ -343,7 +367,7 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             outcome.gaps,
             outcome.rows,
             layer=case.contact.layer_mm,
-            rim=case.hole_radius_mm + case.edge_radius_mm,
+            rim=rim(case),
             quarter=case.symmetry == "quarter",
             stiffness=model.stiffness,
             iterations=summary["newton_iterations"],
@@ -361,6 +385,7 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             "kinetic_over_stored_energy": _kinetic_share(outcome.rows),
             "points": _points(case, session, net, outcome),
         }
+        summary["discretisation_error"] = recovered_error(net, snapshot, mirrors(case))
         if session.root and session.pictures:
             _draw(case, session, model, snapshot)
     return extend(summary, quantities, session)

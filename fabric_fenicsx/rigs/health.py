@@ -91,7 +91,7 @@ def drape_health(
     rows: Rows,
     *,
     layer: float,
-    rim: float,
+    rim: float | None,
     quarter: bool,
     stiffness: Array,
     iterations: int,
@@ -105,7 +105,8 @@ def drape_health(
         gaps: distance of its nodes from punch, die and holder [mm], negative inside, (n_nodes,).
         rows: of `steps.csv`.
         layer: of the contact, δ [mm].
-        rim: radius at which the edge's rounding meets the faces of die and holder [mm].
+        rim: radius at which the edge's rounding meets the faces of die and holder [mm];
+            None where the hole is not round: nothing is said of flange and edge then.
         quarter: whether the net is the part x >= 0, y >= 0 of the sheet.
         stiffness: diagonal of the sections' stiffness, (n_cells, 6) [N, N mm²].
         iterations: of Newton.
@@ -234,17 +235,20 @@ def _penetration(net: Net, gaps: Gaps, rows: Rows, layer: float) -> Part:
     return {"penetration": figures}, said
 
 
-def _distance(net: Net, snapshot: Snapshot, gaps: Gaps, layer: float, rim: float) -> Part:
+def _distance(net: Net, snapshot: Snapshot, gaps: Gaps, layer: float, rim: float | None) -> Part:
     """Bridging under the punch, within what touches it, and the sheet above the die's face."""
     place = (net.points + snapshot.displacement)[:, :2]
     figures, said = {}, []
     punch, die = gaps["punch"], gaps["die"]
     under = _within(place, place[punch < 0.0])
-    flange = np.hypot(*place.T) > rim
-    for key, gap, own, what, cure in (
-        ("bridging_mm", punch, under, "the sheet bridges the punch", "finer tows, less tension"),
-        ("flange_lifted_mm", die, flange, "the flange stands off the die", "a stronger holder"),
-    ):
+    parts = [
+        ("bridging_mm", punch, under, "the sheet bridges the punch", "finer tows, less tension")
+    ]
+    if rim is not None:
+        flange = np.hypot(*place.T) > rim
+        cure = "a stronger holder"
+        parts += [("flange_lifted_mm", die, flange, "the flange stands off the die", cure)]
+    for key, gap, own, what, cure in parts:
         distance = np.where(own, gap, 0.0)
         largest, node = float(distance.max()), int(distance.argmax())
         figures[key] = largest
@@ -261,8 +265,10 @@ def _within(points: Array, corners: Array) -> npt.NDArray[np.bool_]:
         return np.zeros(len(points), dtype=bool)
 
 
-def _edge(net: Net, snapshot: Snapshot, rim: float, quarter: bool) -> Part:
+def _edge(net: Net, snapshot: Snapshot, rim: float | None, quarter: bool) -> Part:
     """Free ends of tows; in a quarter warp ends in y = 0 and weft in x = 0."""
+    if rim is None:
+        return {}, []
     ends = net.ends
     if quarter:
         own = np.where(net.tow_family == WARP, 1, 0)

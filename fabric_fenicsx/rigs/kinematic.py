@@ -37,16 +37,20 @@ def formed_surface(case: DrapeCase, base: Path = Path()) -> FormedSurface:
     """The surface of the sheet at the end of the draw.
 
     Raises:
-        InputError: there is none, or the file of the punch cannot be read.
+        InputError: there is none, or a file of the tools cannot be read.
     """
     depth, file = case.punch_travel_mm, case.punch_stl
     hole, edge = case.hole_radius_mm, case.edge_radius_mm
     surface: FormedSurface
+    if case.die_stl is not None and file is None:
+        raise InputError("die_stl: a kinematic net takes it with punch_stl only")
     try:
         if file is None:
             surface = FormedHemisphere(case.punch_radius_mm, hole, edge, depth)
         else:
-            surface = FormedMould.of(read_stl(base / file), round_die(hole, edge), depth)
+            plate = case.die_stl
+            die = round_die(hole, edge) if plate is None else read_stl(base / plate)
+            surface = FormedMould.of(read_stl(base / file), die, depth)
     except ValueError as error:
         key = "punch_radius_mm" if file is None else f"punch_stl: {file}"
         raise InputError(f"{key}: {error}") from None

@@ -23,7 +23,7 @@ from ..output.report.analysis import Drape, Settings, analysed
 from ..output.report.page import write_page
 from ..output.results import Results, read_results
 from ..output.wrinkles import buckling_ratio
-from .drape import DrapeCase
+from .drape import DrapeCase, rim
 from .load import load_case
 
 __all__ = ["report"]
@@ -156,7 +156,7 @@ def _read(folder: Path, time: float | None, mirror: bool | None) -> Drape:
             "locking": _locking(case),
             "layer": case.contact.layer_mm,
             "areal_weight": _areal_weight(case),
-            "edge_radius": case.hole_radius_mm + case.edge_radius_mm,
+            "edge_radius": rim(case),
             "centre": (case.punch_offset_x_mm, case.punch_offset_y_mm),
         }
     return Drape(
