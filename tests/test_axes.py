@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from test_output import square
 
-from fabric_fenicsx.fabric.axes import axes_shear, tow_axes
+from fabric_fenicsx.fabric.axes import axes_shear, shear_at, tow_axes
 from fabric_fenicsx.fabric.sheet import Sheet, centred_sheet
 from fabric_fenicsx.rigs.common import mesh
-from fabric_fenicsx.rigs.drape import shear_at
 
 SIZE = 96.0
 

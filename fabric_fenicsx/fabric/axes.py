@@ -14,10 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
 
 from .net import Net
 
-__all__ = ["TowAxes", "axes_shear", "tow_axes"]
+__all__ = ["TowAxes", "axes_shear", "shear_at", "tow_axes"]
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -101,6 +102,35 @@ def axes_shear(axes: Floats) -> Floats:
     warp, weft = axes[:, 0], axes[:, 1]
     cosine = np.einsum("ij,ij->i", warp, weft)
     return np.arctan2(cosine, np.linalg.norm(np.cross(weft, warp), axis=1))
+
+
+def shear_at(net: Net, shear: Floats, places: Floats, *, quarter: bool) -> Floats:
+    """A signed angle at places on the flat sheet, from its values at the crossings.
+
+    Cubic and once continuously differentiable between them (Clough and Tocher), the nearest
+    crossing's outside of them.
+
+    Args:
+        net: the net.
+        shear: at its crossings, in any unit, (n_crossings,).
+        places: x and y on the undeformed sheet [mm], (n, 2).
+        quarter: whether the net is the part x >= 0, y >= 0 of a sheet; places may be anywhere, and
+            the angle changes its sign across either axis.
+    """
+    flat = net.points[net.crossings].mean(axis=1)[:, :2]
+    sign = np.ones(len(places))
+    if quarter:
+        sign = np.where(places.prod(axis=1) < 0.0, -1.0, 1.0)
+        places = np.abs(places)
+        inside = (flat > 1e-9 * np.ptp(flat)).all(axis=1)
+        images = [inside, flat[:, 0] > 0.0, flat[:, 1] > 0.0]
+        flips = ((-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0))
+        mirrored = [flat[own] * flip for own, flip in zip(images, flips, strict=True)]
+        signed = [shear[own] * np.prod(flip) for own, flip in zip(images, flips, strict=True)]
+        flat, shear = np.vstack([flat, *mirrored]), np.concatenate([shear, *signed])
+    between = CloughTocher2DInterpolator(flat, shear)(places)
+    outside = NearestNDInterpolator(flat, shear)(places)
+    return sign * np.where(np.isnan(between), outside, between)
 
 
 def _on_tow(

@@ -23,7 +23,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from ..errors import InputError
-from ..fabric.axes import axes_shear
+from ..fabric.axes import axes_shear, shear_at
 from ..fabric.net import Net
 from ..output.convergence import draw_convergence
 from ..output.fibres import nearest_tool
@@ -34,7 +34,7 @@ from ..output.results import read_results
 from ..parallel import from_root
 from .cases import Case
 from .discretisation_error import recovered_error, studied_error
-from .drape import DrapeCase, mirrors, shear_at
+from .drape import DrapeCase, mirrors
 from .levels import FAMILIES, Family, Level, families
 from .richardson import Estimate, estimate_error
 from .run import run

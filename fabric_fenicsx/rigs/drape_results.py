@@ -1,0 +1,128 @@
+"""What a drape leaves behind: its quantities, the table of its crossings, its pictures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..fabric.axes import axes_shear, shear_at
+from ..fabric.crossings import reference_angle
+from ..fabric.net import Net
+from .common import Session, extend, lowest, write_table
+from .discretisation_error import recovered_error
+from .drape import DrapeCase, mirrors, rim
+from .health import drape_health
+from .simulation import Run
+
+if TYPE_CHECKING:
+    from ..solving.model import Model
+    from ..solving.snapshot import Snapshot
+
+__all__ = ["report"]
+
+
+def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dict[str, Any]:
+    """Tables, pictures and quantities of the last accepted step."""
+    quantities: dict[str, Any] = {}
+    summary = outcome.summary
+    snapshot, net = outcome.last, model.net
+    if snapshot is not None:
+        summary["health"] = drape_health(
+            net,
+            snapshot,
+            outcome.gaps,
+            outcome.rows,
+            layer=case.contact.layer_mm,
+            rim=rim(case),
+            quarter=case.symmetry == "quarter",
+            stiffness=model.stiffness,
+            iterations=summary["newton_iterations"],
+            wasted=summary["wasted_iterations"],
+        )
+        _write_crossings(session, net, snapshot)
+        row = outcome.rows[-1]
+        quantities = {
+            "punch_depth_mm": case.punch_travel_mm * snapshot.time / case.duration_s,
+            "punch_force_N": -row["punch_force_z_N"],
+            "holder_force_N": -row["holder_force_z_N"],
+            "holder_height_mm": row["holder_height_mm"],
+            "largest_shear_angle_deg": row["largest_shear_deg"],
+            "lowest_point_mm": lowest(net, snapshot.displacement),
+            "kinetic_over_stored_energy": _kinetic_share(outcome.rows),
+            "points": _points(case, session, net, outcome),
+        }
+        summary["discretisation_error"] = recovered_error(net, snapshot, mirrors(case))
+        if session.root and session.pictures:
+            _draw(case, session, model, snapshot)
+    return extend(summary, quantities, session)
+
+
+def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[dict[str, Any]]:
+    """The case's points with the acute angle there, as a protractor on a photograph gives it."""
+    from .kinematic import known_angles
+
+    snapshot = outcome.last
+    if not case.points or snapshot is None:
+        return []
+    places = np.array([[p.x_mm, p.y_mm] for p in case.points])
+    quarter = case.symmetry == "quarter"
+    axes, directors = (
+        np.degrees(shear_at(net, shear, places, quarter=quarter))
+        for shear in (
+            axes_shear(snapshot.axes),
+            reference_angle(net) + snapshot.director_turn,
+        )
+    )
+    known = known_angles(case, session.base) if outcome.completed else [None] * len(places)
+    return [
+        {
+            **point.model_dump(exclude_none=True),
+            "angle_deg": round(90.0 - abs(float(shear)), 3),
+            "shear_deg": round(float(shear), 3),
+            "director_turn_deg": round(float(turn), 3),
+            **({} if kinematic is None else {"kinematic_deg": kinematic}),
+        }
+        for point, shear, turn, kinematic in zip(case.points, axes, directors, known, strict=True)
+    ]
+
+
+def _kinetic_share(rows: list[dict[str, float]]) -> float:
+    """Largest ratio of kinetic to stored energy after the first tenth of the run."""
+    return max(
+        row["kinetic_N_mm"] / max(row["stored_N_mm"], 1e-300) for row in rows[len(rows) // 10 :]
+    )
+
+
+def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
+    flat = net.points[net.crossings].mean(axis=1)
+    now = flat + snapshot.displacement[net.crossings].mean(axis=1)
+    columns = {"x0_mm": flat[:, 0], "y0_mm": flat[:, 1]}
+    columns |= {f"{axis}_mm": now[:, i] for i, axis in enumerate("xyz")}
+    shear = np.degrees(axes_shear(snapshot.axes))
+    columns["angle_deg"] = 90.0 - np.abs(shear)
+    columns["shear_deg"] = shear
+    columns["director_turn_deg"] = np.degrees(reference_angle(net) + snapshot.director_turn)
+    write_table(session, "crossings.csv", columns)
+
+
+def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -> None:
+    from ..output.pictures import draw_net
+    from ..output.surfaces import tool_surface
+
+    extent = 0.62 * max(case.sheet.width_mm, case.sheet.length_mm)
+    surfaces = [tool_surface(tool, extent, model.tool_place(tool.name)) for tool in model.tools]
+    depth = case.punch_travel_mm * snapshot.time / case.duration_s
+    for view, shown in (
+        ("perspective", [s for s in surfaces if s.name != "holder"]),
+        ("top", [s for s in surfaces if s.name == "die"]),
+    ):
+        draw_net(
+            session.folder / f"drape_{view}.png",
+            model.net,
+            snapshot,
+            surfaces=shown,
+            view=view,
+            title=f"punch at {depth:.0f} mm",
+            mirror=case.symmetry == "quarter",
+        )
