@@ -148,9 +148,11 @@ def test_fibres_need_no_paraview_folder(completed, tmp_path):
     np.testing.assert_allclose(shear, np.sort(np.repeat(90.0 - angles, 4)), atol=1e-6)
 
 
-def test_quiet_prints_nothing(case, tmp_path):
+def test_quiet_prints_nothing_but_warnings(case, tmp_path):
     process = command("run", case, "--out", tmp_path, "--quiet", "--no-pictures")
-    assert (process.returncode, process.stdout, process.stderr) == (0, "", "")
+    assert (process.returncode, process.stdout) == (0, "")
+    warnings = json.loads((tmp_path / "result.json").read_text())["health"]["warnings"]
+    assert process.stderr.splitlines() == [f"warning: {sentence}" for sentence in warnings]
     assert not list(tmp_path.glob("*.png"))
 
 

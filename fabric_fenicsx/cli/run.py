@@ -32,7 +32,9 @@ def run(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the last accepted step in DIR.")
     ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="No progress and no summary.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", help="No progress and no summary; warnings still.")
+    ] = False,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="Draw no pictures.")] = False,
 ) -> None:
     """Run a case and write its results.
