@@ -26,7 +26,7 @@ __all__ = ["load_case"]
 OPTION = "--set"
 
 
-def load_case(path: Path, settings: Sequence[str] = ()) -> Case:
+def load_case(path: Path | str, settings: Sequence[str] = ()) -> Case:
     """Read a case file and check it.
 
     Args:
@@ -39,6 +39,7 @@ def load_case(path: Path, settings: Sequence[str] = ()) -> Case:
     Raises:
         InputError: one line that names the file (or ``--set``), the key and what is allowed.
     """
+    path = Path(path)
     data = read_yaml(path, "a case file")
     if not isinstance(data, dict):
         what = "empty" if data is None else plain(data)
