@@ -431,25 +431,21 @@ def test_the_hemisphere_converges(hemisphere):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("friction", "keys"),
+    "keys",
     [
-        (0.0, {"contact.stiffness_N_mm2": 4.0}),  # four times as stiff
-        (0.0, {"tow.relaxation_time_s": 0.5}),
-        (0.0, {"tow.relaxation_time_s": 2.0}),
-        (0.1, {"symmetry": "none", "punch_offset_x_mm": 0.05}),
+        {"contact.stiffness_N_mm2": 4.0},  # four times as stiff
+        {"tow.relaxation_time_s": 0.5},
+        {"tow.relaxation_time_s": 2.0},
+        {"symmetry": "none", "punch_offset_x_mm": 0.05},
     ],
     ids=str,
 )
-def test_the_hemisphere_does_not_depend_on(friction, keys, tmp_path):
-    """Contact's stiffness, viscosity, tools beside the sheet's middle: less than 0.2 degrees.
-
-    Without friction a whole sheet slides off sideways, by 4.6 mm from an offset of 0.05; with it
-    stiffer contact in the holder's gap would press, and so rub, four times as hard.
-    """
+def test_the_hemisphere_does_not_depend_on(keys, tmp_path):
+    """Contact's stiffness, viscosity, tools beside the sheet's middle: less than 0.2 degrees."""
     tables = []
     for k, changed in enumerate(({}, keys)):
         settings = [f"{key}={value}" for key, value in changed.items()]
-        case = load_case(DEMOS / "drape.yaml", [f"contact.friction={friction}", *settings])
+        case = load_case(DEMOS / "drape.yaml", settings)
         assert run(case, tmp_path / str(k), base=DEMOS, pictures=False)["completed"]
         table = pd.read_csv(tmp_path / str(k) / "crossings.csv")
         own = table[(table["x0_mm"] > 0) & (table["y0_mm"] > 0)].sort_values(["x0_mm", "y0_mm"])
