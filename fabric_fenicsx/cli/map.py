@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from ..errors import InputError
@@ -165,7 +164,7 @@ def map(
                 texts[path] = write(mesh, fibres, layers, material or "")
             elif path.suffix == ".rad":
                 factor = bare.layer(1.0, math.nan, constant=constant, share=share).thickness
-                texts[path] = drape(mesh, fibres, factor, layers, np.array(reference))
+                texts[path] = drape(mesh, fibres, factor, layers, reference)
             elif path.suffix == ".csv":
                 texts[path] = table(mesh, fibres)
         except ValueError as error:
@@ -237,7 +236,7 @@ def _tell(mesh: ShellMesh, fibres: ShellFibres) -> None:
             f" {areas[bare].sum() / areas.sum():.1%} of the area) are not covered by the fabric:"
             " they have no direction"
         )
-    tight = int(np.sum(fibres.fraction.sum(axis=1) > DENSEST))
+    tight = int((fibres.fraction.sum(axis=1) > DENSEST).sum())
     if tight:
         say(
             f"{tight} elements have a fibre volume fraction above {DENSEST:.3f}, the largest that"

@@ -185,7 +185,11 @@ def abaqus(mesh: ShellMesh, fibres: ShellFibres, layers: list[Ply], material: st
 
 
 def drape(
-    mesh: ShellMesh, fibres: ShellFibres, factor: Array, layers: list[Ply], reference: Array
+    mesh: ShellMesh,
+    fibres: ShellFibres,
+    factor: Array,
+    layers: list[Ply],
+    reference: tuple[float, float, float],
 ) -> str:
     """A block /DRAPE for each ply; columns as OpenRadioss reads them, angles in degrees.
 
@@ -196,7 +200,7 @@ def drape(
         fibres: on its elements.
         factor: thickness of the layer over that of the flat one, shape (n,).
         layers: the plies.
-        reference: VX, VY, VZ of the stack, shape (3,).
+        reference: VX, VY, VZ of the stack.
 
     Raises:
         ValueError: an element of second order, or the reference is across an element.
@@ -205,7 +209,7 @@ def drape(
         raise ValueError("OpenRadioss has no shells of second order, allowed are S3 and S4")
     rows_of = np.flatnonzero(fibres.covered)
     normals = mesh.normals[rows_of]
-    start = reference - (normals @ reference)[:, None] * normals
+    start = np.asarray(reference) - (normals @ reference)[:, None] * normals
     length = np.linalg.norm(start, axis=1)
     across = np.flatnonzero(length < 1e-3 * np.linalg.norm(reference))
     if len(across):
