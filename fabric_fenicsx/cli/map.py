@@ -11,7 +11,6 @@ import typer
 from ..errors import InputError
 from .collective import say
 from .results import Folder, Mirror, Time, listed, opened, writable
-from .shell_mesh import read_shell_mesh
 
 if TYPE_CHECKING:
     from ..inputs.shell_mesh import ShellMesh
@@ -111,6 +110,7 @@ def map(
     from ..output.files import write_text, write_vtk
     from ..output.shell_files import LAYUPS, abaqus, calculix, drape, grid, plies, table
     from ..output.shells import SIDES, Placement, on_shells, warp_share
+    from .shell_mesh import read_shell_mesh
 
     results, mirror, _ = opened(folder, mirror)
     for name, given, allowed in (

@@ -118,7 +118,9 @@ class DrapeCase(Case):
 
     @model_validator(mode="after")
     def _fits(self) -> DrapeCase:
-        if self.holder_force_N is not None and "holder_gap_mm" in self.model_fields_set:
+        default = type(self).model_fields["holder_gap_mm"].default
+        # A case that was run has all its defaults written out, and can be run again.
+        if self.holder_force_N is not None and self.holder_gap_mm != default:
             raise ValueError("holder_force_N, holder_gap_mm: one of the two")
         if self.holder_force_N is None and self.holder_gap_mm < -self.contact.layer_mm / 2.0:
             raise ValueError(
