@@ -35,7 +35,7 @@ def message(path: Path, *settings: str) -> str:
 
 @pytest.mark.parametrize("path", sorted(DEMOS.glob("*.yaml")), ids=lambda path: path.stem)
 def test_demos_are_valid(path):
-    assert load_case(path).test == path.stem.removesuffix("_paper")
+    assert load_case(path).test in RIGS
 
 
 def test_settings_lie_over_the_file(tmp_path):
@@ -279,3 +279,12 @@ def test_a_sheet_is_checked_with_its_own_weave(tmp_path):
     assert load_case(written(tmp_path, sheet + small)).weave is not None
     said = message(written(tmp_path, sheet + small.replace("[4]", "[24]")))
     assert "warp spacing is [24.0] mm; the outline is 20 mm wide" in said
+
+
+def test_a_punch_that_meets_the_edge_of_the_hole_is_refused():
+    """A ball of 85 mm over a hole of 80 with an edge of 10: (95² − 90²)^½ of height are left."""
+    keys = {"test": "drape", "punch_radius_mm": 85.0}
+    deepest = 95.0 - np.sqrt(95.0**2 - 90.0**2)
+    assert DrapeCase.model_validate(keys | {"punch_travel_mm": deepest - 0.01})
+    with pytest.raises(ValueError, match=r"punch_travel_mm: at most 64\.59"):
+        DrapeCase.model_validate(keys | {"punch_travel_mm": deepest + 0.01})

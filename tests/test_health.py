@@ -26,6 +26,8 @@ ROW = {
     "punch_penetration_mm": 0.1,
     "die_penetration_mm": 0.1,
     "holder_penetration_mm": 0.1,
+    "external_work_N_mm": 1.0,
+    "lost_N_mm": 0.0,
 }
 NET = plain_net(4, 4, 12.0, 2)
 NODES = len(NET.points)
@@ -39,7 +41,7 @@ def resting(**changes):
     return replace(at_rest(NET), **changes)
 
 
-def health(snapshot, rows=(ROW,), rim=1.0, wasted=0, gaps=GAPS):
+def health(snapshot, rows=(ROW,), rim=1.0, wasted=0, gaps=GAPS, quarter=False, **more):
     return drape_health(
         NET,
         snapshot,
@@ -47,10 +49,11 @@ def health(snapshot, rows=(ROW,), rim=1.0, wasted=0, gaps=GAPS):
         rows,
         layer=1.0,
         rim=rim,
-        quarter=False,
+        quarter=quarter,
         stiffness=STIFFNESS,
         iterations=100,
         wasted=wasted,
+        **more,
     )
 
 
@@ -73,6 +76,11 @@ def pressed(share):
 def lifted(tool, where, by):
     """Health with one node off a tool that all others touch."""
     return health(resting(), gaps=GAPS | {tool: np.where(np.arange(NODES) == where, by, -0.1)})
+
+
+def moved(by):
+    """The whole sheet shifted sideways."""
+    return resting(displacement=np.tile([by, 0.0, 0.0], (NODES, 1)))
 
 
 MIDDLE = int(np.hypot(*(NET.points - NET.points.mean(axis=0))[:, :2].T).argmin())
@@ -103,6 +111,15 @@ CASES = {
     "not slow": (
         lambda: health(resting(), [ROW | {"kinetic_N_mm": 0.02}]),
         lambda: health(resting(), [ROW | {"kinetic_N_mm": 0.009}]),
+    ),
+    "has slid": (lambda: health(moved(1.2)), lambda: health(moved(0.8))),
+    "energy has come from nowhere": (
+        lambda: health(resting(), [ROW | {"lost_N_mm": -0.06}]),
+        lambda: health(resting(), [ROW | {"lost_N_mm": -0.04}]),
+    ),
+    "closed to a gap and rubs": (
+        lambda: health(resting(), squeezed=True),
+        lambda: health(resting()),
     ),
     "failed steps": (lambda: health(resting(), wasted=30), lambda: health(resting(), wasted=20)),
 }
@@ -172,3 +189,26 @@ def test_a_stop_is_the_exit_code(tmp_path, capfd):
     assert ended.value.code == 1
     printed = capfd.readouterr().err
     assert "falls freely" in printed and "warning: the sheet has left the holder" in printed
+
+
+def test_a_quarter_bridges_between_its_images():
+    """Only far from the middle the punch is touched: the hull of a quarter's nodes misses it."""
+    x, y = (NET.points - NET.points.min(axis=0))[:, :2].T
+    outer = (x > 30.0) | (y > 30.0)
+    quarter = replace(NET, points=NET.points - NET.points.min(axis=0))
+    gaps = GAPS | {"punch": np.where(outer & (x > 0) & (y > 0), -0.1, 3.0)}
+    state = {"rim": None, "stiffness": STIFFNESS, "iterations": 1, "wasted": 0, "layer": 1.0}
+    found = drape_health(quarter, at_rest(quarter), gaps, [ROW], quarter=True, **state)
+    assert found["bridging_mm"] == 3.0
+    assert any("bridges the punch" in sentence for sentence in found["warnings"])
+    where = [sentence for sentence in found["warnings"] if "bridges" in sentence]
+    assert found["warnings"] == where
+
+
+def test_flange_and_edge_are_counted_from_the_tools_axis():
+    """A hole that lies beside the sheet has no sheet over it."""
+    middle = NET.points.mean(axis=0)[:2]
+    far = (float(middle[0]) + 500.0, float(middle[1]))
+    over = health(resting(), rim=200.0, axis=tuple(map(float, middle)))
+    beside = health(resting(), rim=200.0, axis=far)
+    assert over["edge_inside_share"] == 1.0 and beside["edge_inside_share"] == 0.0

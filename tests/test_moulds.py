@@ -316,3 +316,14 @@ def test_punch_of_a_case(tmp_path):
     assert punch.path(case.duration_s)[2] + lowest == pytest.approx(-90.0)
     with pytest.raises(InputError, match=r"none\.stl: cannot be read"):
         tools(case.model_copy(update={"punch_stl": "none.stl"}), tmp_path)
+
+
+def test_an_unsymmetric_punch_needs_the_whole_sheet(tmp_path):
+    """A step along x in a quarter: the mirrored half would lie inside the punch."""
+    body = pv.Box((-20.0, 20.0, -20.0, 20.0, -40.0, 0.0)).triangulate()
+    body.points[:, 2] += 0.3 * body.points[:, 0]
+    body.save(tmp_path / "step.stl")
+    case = DrapeCase(test="drape", punch_stl="step.stl")
+    with pytest.raises(InputError, match=r"punch_stl: step.stl: not symmetric about x = 0"):
+        tools(case, tmp_path)
+    assert tools(case.model_copy(update={"symmetry": "none"}), tmp_path)[0].name == "punch"

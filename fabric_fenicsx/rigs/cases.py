@@ -95,7 +95,7 @@ class TowKeys(Keys):
         if (self.section_law == "bundle") != (self.bundle is not None):
             raise ValueError("bundle: goes with section_law: bundle, and only with it")
         if self.bundle is not None and self.per_width_mm is not None:
-            raise ValueError("per_width_mm: a bundle has tow_spacing_mm in its place")
+            raise ValueError("per_width_mm: null with a bundle, which has tow_spacing_mm")
         return self
 
 

@@ -7,6 +7,7 @@ frictionless unless the case says otherwise: the paper oiled them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from ..errors import InputError
 from ..fabric.layout import TowLayout
 from ..fabric.net import Net
 from ..fabric.paths import TowPaths
@@ -24,6 +26,7 @@ from .rig import Rig
 from .weave_keys import SheetKeys, WeaveKeys, crossing_weights, layout
 
 if TYPE_CHECKING:
+    from ..geometry.triangles import Triangles
     from ..mechanics.tools import Tool
     from ..solving.contacts import ContactLaw
     from ..solving.model import Model, Support
@@ -31,6 +34,9 @@ if TYPE_CHECKING:
     from .common import Session
 
 __all__ = ["RIG", "DrapeCase", "build", "run", "tools"]
+
+MIRRORED_POINTS = 2000
+"""Of a tool's surface, at which its symmetry is looked at."""
 
 
 class ContactKeys(Keys):
@@ -95,7 +101,8 @@ class DrapeCase(Case):
     holder_gap_mm: float = Field(
         -0.2,
         description="between holder and die when closed; below zero the contact layers overlap, "
-        "at most by contact.layer_mm / 2",
+        "at most by contact.layer_mm / 2, and the holder's force follows from their stiffness and "
+        "the number of tows",
     )
     holder_force_N: Positive | None = Field(
         None,
@@ -128,13 +135,27 @@ class DrapeCase(Case):
             )
         if self.symmetry == "quarter" and (self.punch_offset_x_mm or self.punch_offset_y_mm):
             raise ValueError("punch_offset_x_mm, punch_offset_y_mm: need symmetry: none")
-        too_deep = self.punch_travel_mm > self.punch_radius_mm + self.edge_radius_mm
-        if self.punch_stl is None and too_deep:
+        if self.punch_stl is None:
+            self._ball_passes()
+        return self
+
+    def _ball_passes(self) -> None:
+        """A hemisphere without a shank goes as deep as its rim, and as the hole lets it."""
+        ball, edge = self.punch_radius_mm, self.edge_radius_mm
+        if self.punch_travel_mm > ball + edge:
             raise ValueError(
                 "punch_travel_mm: at most punch_radius_mm + edge_radius_mm, "
                 "the punch is a hemisphere without a shank"
             )
-        return self
+        centre = ball - self.punch_travel_mm
+        room = math.hypot(self.hole_radius_mm + edge, centre + edge) - edge
+        if self.die_stl is None and room < ball:
+            reach = (ball + edge) ** 2 - (self.hole_radius_mm + edge) ** 2
+            deepest = ball + edge - math.sqrt(reach)
+            raise ValueError(
+                f"punch_travel_mm: at most {deepest:.4g}, there a punch of {ball:g} mm meets the "
+                "edge of the hole"
+            )
 
 
 def flat_sheet(case: DrapeCase, base: Path) -> Sheet | TowLayout:
@@ -171,11 +192,34 @@ def check(case: DrapeCase) -> None:
 
 def read_files(case: DrapeCase, base: Path) -> None:
     """Read the files of the tools."""
+    for key in ("punch_stl", "die_stl"):
+        tool_surface(case, base, key)
+
+
+def tool_surface(case: DrapeCase, base: Path, key: str) -> Triangles | None:
+    """The surface that the case names by a key, if it names one.
+
+    Raises:
+        InputError: it cannot be read, is no surface with two sides, or is not symmetric although
+            the case models its quarter.
+    """
+    from ..geometry.distance import exact_distance
     from ..geometry.triangles import read_stl
 
-    for file in (case.punch_stl, case.die_stl):
-        if file is not None:
-            read_stl(base / file)
+    file = getattr(case, key)
+    if file is None:
+        return None
+    surface = read_stl(base / file)
+    if case.symmetry == "quarter":
+        some = surface.points[:: max(1, len(surface.points) // MIRRORED_POINTS)]
+        for axis, flip in (("x", (-1.0, 1.0, 1.0)), ("y", (1.0, -1.0, 1.0))):
+            off = float(np.abs(exact_distance(surface, some * flip)).max())
+            if off > case.punch_cell_mm:
+                raise InputError(
+                    f"{key}: {file}: not symmetric about {axis} = 0, by {off:.2g} mm; allowed with "
+                    "symmetry: none"
+                )
+    return surface
 
 
 def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
@@ -189,10 +233,9 @@ def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
         InputError: a tool's file cannot be read or is no surface with two sides.
     """
     from ..geometry.distance import DistanceGrid
-    from ..geometry.triangles import read_stl
     from ..mechanics.tools import HoledPlate, Mould, Sphere
 
-    shape = None if case.punch_stl is None else read_stl(base / case.punch_stl)
+    shape, face = (tool_surface(case, base, key) for key in ("punch_stl", "die_stl"))
     top = case.punch_radius_mm if shape is None else -float(shape.points[:, 2].min())
     speed = case.punch_travel_mm / case.duration_s
     x, y = case.punch_offset_x_mm, case.punch_offset_y_mm
@@ -211,8 +254,8 @@ def tools(case: DrapeCase, base: Path = Path()) -> list[Tool]:
     first: Tool = Sphere("punch", punch, case.punch_radius_mm)
     if shape is not None:
         first = Mould("punch", punch, shape, DistanceGrid.of(shape, cell, 3.0 * cell))
-    if case.die_stl is not None:
-        plate = Mould.from_stl("die", die, base / case.die_stl, cell=cell, margin=3.0 * cell)
+    if face is not None:
+        plate = Mould("die", die, face, DistanceGrid.of(face, cell, 3.0 * cell))
         return [first, plate, plate.turned_over("holder", holder)]
     hole, edge = case.hole_radius_mm, case.edge_radius_mm
     return [

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..fabric.axes import axes_shear, shear_at
-from ..fabric.crossings import reference_angle
 from ..fabric.net import Net
 from .common import Session, extend, lowest, write_table
 from .discretisation_error import recovered_error
@@ -35,6 +34,8 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             outcome.rows,
             layer=case.contact.layer_mm,
             rim=rim(case),
+            squeezed=_squeezed(case),
+            axis=(case.punch_offset_x_mm, case.punch_offset_y_mm),
             quarter=case.symmetry == "quarter",
             stiffness=model.stiffness,
             iterations=summary["newton_iterations"],
@@ -67,24 +68,28 @@ def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[d
         return []
     places = np.array([[p.x_mm, p.y_mm] for p in case.points])
     quarter = case.symmetry == "quarter"
-    axes, directors = (
+    totals, shears, directors = (
         np.degrees(shear_at(net, shear, places, quarter=quarter))
-        for shear in (
-            axes_shear(snapshot.axes),
-            reference_angle(net) + snapshot.director_turn,
-        )
+        for shear in (axes_shear(snapshot.axes), snapshot.shear_angle, snapshot.director_turn)
     )
     known = known_angles(case, session.base) if outcome.completed else [None] * len(places)
     return [
         {
             **point.model_dump(exclude_none=True),
-            "angle_deg": round(90.0 - abs(float(shear)), 3),
+            "angle_deg": round(90.0 - abs(float(total)), 3),
             "shear_deg": round(float(shear), 3),
             "director_turn_deg": round(float(turn), 3),
             **({} if kinematic is None else {"kinematic_deg": kinematic}),
         }
-        for point, shear, turn, kinematic in zip(case.points, axes, directors, known, strict=True)
+        for point, total, shear, turn, kinematic in zip(
+            case.points, totals, shears, directors, known, strict=True
+        )
     ]
+
+
+def _squeezed(case: DrapeCase) -> bool:
+    rubs = case.contact.friction > 0.0 and "holder" not in case.contact.frictionless
+    return rubs and case.holder_force_N is None and case.holder_gap_mm < 0.0
 
 
 def _kinetic_share(rows: list[dict[str, float]]) -> float:
@@ -99,10 +104,9 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
     now = flat + snapshot.displacement[net.crossings].mean(axis=1)
     columns = {"x0_mm": flat[:, 0], "y0_mm": flat[:, 1]}
     columns |= {f"{axis}_mm": now[:, i] for i, axis in enumerate("xyz")}
-    shear = np.degrees(axes_shear(snapshot.axes))
-    columns["angle_deg"] = 90.0 - np.abs(shear)
-    columns["shear_deg"] = shear
-    columns["director_turn_deg"] = np.degrees(reference_angle(net) + snapshot.director_turn)
+    columns["angle_deg"] = 90.0 - np.abs(np.degrees(axes_shear(snapshot.axes)))
+    columns["shear_deg"] = np.degrees(snapshot.shear_angle)
+    columns["director_turn_deg"] = np.degrees(snapshot.director_turn)
     write_table(session, "crossings.csv", columns)
 
 

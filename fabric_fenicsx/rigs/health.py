@@ -38,6 +38,13 @@ BUCKLING_SHARE = 0.1
 """Share of cells pressed beyond Euler's load of a span, in or out of the sheet's plane. Some are
 always, between tools that hold them: 6 % in a drape that converges, 20 to 50 % in folded ones."""
 
+SLID_MM = 1.0
+"""Shifts the places at which angles are read by as much; a whole sheet that lies symmetrically
+slides by round-off."""
+
+WON_SHARE = 0.05
+"""Of the work, won by contact that grew stiffer; drapes that go well lose energy."""
+
 KINETIC_SHARE = 0.01
 """Kinetic over stored energy below which a draw counts as slow."""
 
@@ -92,6 +99,8 @@ def drape_health(
     *,
     layer: float,
     rim: float | None,
+    axis: tuple[float, float] = (0.0, 0.0),
+    squeezed: bool = False,
     quarter: bool,
     stiffness: Array,
     iterations: int,
@@ -107,6 +116,8 @@ def drape_health(
         layer: of the contact, δ [mm].
         rim: radius at which the edge's rounding meets the faces of die and holder [mm];
             None where the hole is not round: nothing is said of flange and edge then.
+        axis: x and y of the tools' axis [mm].
+        squeezed: whether the holder overlaps the sheet by a given gap and rubs on it.
         quarter: whether the net is the part x >= 0, y >= 0 of the sheet.
         stiffness: diagonal of the sections' stiffness, (n_cells, 6) [N, N mm²].
         iterations: of Newton.
@@ -116,9 +127,11 @@ def drape_health(
         _tilt(net, snapshot),
         _turn(net, snapshot),
         _penetration(net, gaps, rows, layer),
-        _distance(net, snapshot, gaps, layer, rim),
-        _edge(net, snapshot, rim, quarter),
+        _distance(net, snapshot, gaps, layer, rim, axis, quarter),
+        _edge(net, snapshot, rim, axis, quarter),
         _compression(net, snapshot, stiffness),
+        _place(net, snapshot, quarter),
+        _balance(rows),
         _course(rows, iterations, wasted),
     ]
     figures: dict[str, Any] = {}
@@ -126,6 +139,11 @@ def drape_health(
     for values, sentences in parts:
         figures |= values
         warnings += sentences
+    if squeezed:
+        warnings.append(
+            "the holder is closed to a gap and rubs: its force, and that of the punch, depend on "
+            "the contact's stiffness and the number of tows; give holder_force_N"
+        )
     return {**figures, "warnings": warnings}
 
 
@@ -206,8 +224,8 @@ def _turn(net: Net, snapshot: Snapshot) -> Part:
         where = _flat(net, int(net.crossings[int(apart.argmax()), 0]))
         said.append(
             f"the springs feel another angle than the tows have: by more than {TURN_DEG:g} degrees "
-            f"at {share:.0%} of the crossings, most at {where} by {largest:.1f}; take finer cells, "
-            "or tows that bend less within a spacing"
+            f"at {share:.0%} of the crossings, most at {where} by {largest:.1f}; take a "
+            "smaller spacing, or see whether finer cells change the result"
         )
     return {"directors_apart_share": share, "largest_directors_apart_deg": largest}, said
 
@@ -235,17 +253,35 @@ def _penetration(net: Net, gaps: Gaps, rows: Rows, layer: float) -> Part:
     return {"penetration": figures}, said
 
 
-def _distance(net: Net, snapshot: Snapshot, gaps: Gaps, layer: float, rim: float | None) -> Part:
+def _distance(
+    net: Net,
+    snapshot: Snapshot,
+    gaps: Gaps,
+    layer: float,
+    rim: float | None,
+    axis: tuple[float, float],
+    quarter: bool,
+) -> Part:
     """Bridging under the punch, within what touches it, and the sheet above the die's face."""
     place = (net.points + snapshot.displacement)[:, :2]
     figures, said = {}, []
     punch, die = gaps["punch"], gaps["die"]
-    under = _within(place, place[punch < 0.0])
+    touching = place[punch < 0.0]
+    if quarter:
+        images = ((1, 1), (-1, 1), (1, -1), (-1, -1))
+        touching = np.vstack([touching * signs for signs in images])
+    under = _within(place, touching)
     parts = [
-        ("bridging_mm", punch, under, "the sheet bridges the punch", "finer tows, less tension")
+        (
+            "bridging_mm",
+            punch,
+            under,
+            "the sheet bridges the punch",
+            "less tension, or a shape that this fabric can follow",
+        )
     ]
     if rim is not None:
-        flange = np.hypot(*place.T) > rim
+        flange = np.hypot(*(place - axis).T) > rim
         cure = "a stronger holder"
         parts += [("flange_lifted_mm", die, flange, "the flange stands off the die", cure)]
     for key, gap, own, what, cure in parts:
@@ -265,7 +301,9 @@ def _within(points: Array, corners: Array) -> npt.NDArray[np.bool_]:
         return np.zeros(len(points), dtype=bool)
 
 
-def _edge(net: Net, snapshot: Snapshot, rim: float | None, quarter: bool) -> Part:
+def _edge(
+    net: Net, snapshot: Snapshot, rim: float | None, axis: tuple[float, float], quarter: bool
+) -> Part:
     """Free ends of tows; in a quarter warp ends in y = 0 and weft in x = 0."""
     if rim is None:
         return {}, []
@@ -275,7 +313,7 @@ def _edge(net: Net, snapshot: Snapshot, rim: float | None, quarter: bool) -> Par
         along = np.take_along_axis(net.points[ends], own[:, None, None], axis=2)[:, :, 0]
         ends = ends[np.abs(along) > 1e-9 * np.ptp(net.points)]
     ends = np.unique(ends)
-    place = (net.points + snapshot.displacement)[ends, :2]
+    place = (net.points + snapshot.displacement)[ends, :2] - axis
     inside = np.hypot(*place.T) < rim
     share = float(inside.mean())
     said = []
@@ -318,6 +356,36 @@ def _compression(net: Net, snapshot: Snapshot, stiffness: Array) -> Part:
     return figures, said
 
 
+def _place(net: Net, snapshot: Snapshot, quarter: bool) -> Part:
+    """How far a whole sheet has slid sideways; planes of symmetry hold a quarter."""
+    if quarter or not len(net.crossings):
+        return {}, []
+    slid = float(np.hypot(*snapshot.displacement[net.crossings.ravel(), :2].mean(axis=0)))
+    said = []
+    if slid > SLID_MM:
+        said.append(
+            f"the sheet as a whole has slid by {slid:.2g} mm: with little friction its place "
+            "depends on steps and mesh; take friction or a stronger holder, or compare with a "
+            "smaller solver.largest_step_s"
+        )
+    return {"slid_mm": slid}, said
+
+
+def _balance(rows: Rows) -> Part:
+    """What went where, of the work done; nothing may be won."""
+    last = rows[-1]
+    work = max(abs(last["external_work_N_mm"]), abs(last["stored_N_mm"]), 1e-300)
+    won = max(0.0, -last["lost_N_mm"]) / work
+    said = []
+    if won > WON_SHARE:
+        said.append(
+            f"energy has come from nowhere, {won:.0%} of the work: contact that had to grow "
+            "stiffer has pushed back; forces of the tools are doubtful, take a smaller "
+            "contact.layer_mm or a larger contact.stiffness_N_mm2"
+        )
+    return {"energy_won_share": won}, said
+
+
 def _course(rows: Rows, iterations: int, wasted: int) -> Part:
     late = rows[len(rows) // 10 :]
     kinetic = max(row["kinetic_N_mm"] / max(abs(row["stored_N_mm"]), 1e-300) for row in late)
@@ -325,8 +393,9 @@ def _course(rows: Rows, iterations: int, wasted: int) -> Part:
     share = wasted / max(iterations, 1)
     said = []
     if kinetic > KINETIC_SHARE:
+        size = f"up to {kinetic:.2g}" if kinetic < FLYING else "many times"
         said.append(
-            f"the draw is not slow: kinetic energy up to {kinetic:.2g} of the stored one; take a "
+            f"the draw is not slow: kinetic energy {size} of the stored one; take a "
             "longer duration_s or a smaller solver.mass_scale"
         )
     if share > WASTED_SHARE:
