@@ -33,7 +33,6 @@ VARIATIONS: dict[str, list[str]] = {
     "sheet 312 mm": ["sheet.width_mm=312", "sheet.length_mm=312"],
     "edge radius 8 mm instead of 10": ["edge_radius_mm=8"],
     "edge radius 12 mm": ["edge_radius_mm=12"],
-    "friction 0.1 instead of none": ["contact.friction=0.1"],
     "friction 0.3": ["contact.friction=0.3"],
     "shear springs halved": ["crossover.k1_N_mm=0.01", "crossover.k3_N_mm=0.04"],
     "shear springs doubled": ["crossover.k1_N_mm=0.04", "crossover.k3_N_mm=0.16"],
@@ -41,8 +40,6 @@ VARIATIONS: dict[str, list[str]] = {
     "dashpots doubled": ["crossover.dashpot_N_s_mm=4"],
     "relaxation time of bending 0.5 s instead of 1": ["tow.relaxation_time_s=0.5"],
     "relaxation time of bending 2 s": ["tow.relaxation_time_s=2"],
-    "holder closed from the start": ["holder_gap_start_mm=-0.2"],
-    "holder gap -0.4 mm instead of -0.2": ["holder_gap_mm=-0.4"],
     "contact four times as stiff": ["contact.stiffness_N_mm2=4"],
     "punch 0.05 mm off its axis": ["symmetry=none", "punch_offset_x_mm=0.05"],
     "four cells per spacing instead of two": ["sheet.subdivisions=4"],
@@ -54,10 +51,16 @@ VARIATIONS: dict[str, list[str]] = {
 #: Of one of the cases only.
 OWN = {
     "bundles": {
+        "no friction instead of 0.1": ["contact.friction=0"],
+        "holder force 40 N instead of 80": ["holder_force_N=40"],
+        "holder force 400 N": ["holder_force_N=400"],
+        "in-plane bending three times as high": ["tow.stiffness.bending_in_plane_Nmm=28.5"],
         "in-plane bending a tenth": ["tow.stiffness.bending_in_plane_Nmm=0.95"],
         "half the spacing": ["sheet.warp_spacing_mm=3", "sheet.weft_spacing_mm=3"],
     },
     "solid strips": {
+        "friction 0.1 instead of none": ["contact.friction=0.1"],
+        "holder gap -0.4 mm instead of -0.2": ["holder_gap_mm=-0.4"],
         "half the spacing": [
             "sheet.warp_spacing_mm=6",
             "sheet.weft_spacing_mm=6",
