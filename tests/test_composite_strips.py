@@ -128,8 +128,8 @@ def test_deflections_as_measured(beam, theta, record_property):
     """
     off, measured, across = deviations(beam, theta)
     largest = measured[across].max()
-    record_property("rms mm", rms(off))
-    record_property("max mm", np.abs(off).max())
+    record_property("rms mm", float(rms(off)))
+    record_property("max mm", float(np.abs(off).max()))
     assert rms(off[across]) < 0.08 * largest, f"{rms(off[across])} of {largest} mm"
     assert np.abs(off[across]).max() < 0.12 * largest
 
