@@ -84,9 +84,10 @@ def displacements(folder: Path, name: str) -> dict[int, np.ndarray]:
     """What CalculiX finds in a deck for each node."""
     ccx = shutil.which("ccx")
     if ccx is None:
-        if (ROOT / ".venv" / "setup-stamp").exists():
+        policy = ["apt-cache", "policy", "calculix-ccx"]
+        if "Candidate: 2" in subprocess.run(policy, capture_output=True, text=True).stdout:
             pytest.fail("there is no ccx: make setup installs calculix-ccx")
-        pytest.skip("there is no ccx")
+        pytest.skip("there is no ccx, and this Debian has no package of it")
     done = subprocess.run([ccx, name], cwd=folder, capture_output=True, text=True, timeout=100)
     assert "Job finished" in done.stdout and "*ERROR" not in done.stdout, done.stdout[-3000:]
     assert "WARNING" not in done.stdout, done.stdout
