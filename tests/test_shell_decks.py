@@ -29,8 +29,6 @@ from fabric_fenicsx.inputs.deck import read_deck
 from fabric_fenicsx.output.shells import Placement
 from fabric_fenicsx.solving.snapshot import at_rest
 
-ROOT = Path(__file__).parents[1]
-
 E1, E2, NU12, NU23, G12, G23 = 120e3, 8e3, 0.3, 0.4, 4e3, 3e3
 
 MATERIAL = f"""*MATERIAL, NAME=UD
