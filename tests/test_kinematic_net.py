@@ -343,7 +343,10 @@ WRONG = {
     "spacing": ([DEMO, "--spacing", "0"], "spacing: 0 mm, allowed is above 0"),
     "too coarse": ([DEMO, "--spacing", "21"], "at most a quarter of the hole's radius, 20"),
     "too fine": ([DEMO, "--spacing", "0.01"], "crossings, allowed are"),
-    "punch and hole": ([DEMO, "--set", "punch_radius_mm=90"], "punch_radius_mm: "),
+    "punch and hole": (
+        [DEMO, "--set", "punch_radius_mm=90", "--set", "punch_travel_mm=40"],
+        "punch_radius_mm: ",
+    ),
     "no file": ([DEMO, "--set", "punch_stl=none.stl"], "none.stl"),
     "beside the sheet": (
         [DEMO, "--set", "symmetry=none", "--set", "punch_offset_x_mm=150"],
