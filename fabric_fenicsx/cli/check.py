@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .options import Settings
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -18,10 +20,7 @@ __all__ = ["check"]
 
 def check(
     case: Annotated[Path, typer.Argument(metavar="CASE.yaml", help="The case file.")],
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Put a value over the file's."),
-    ] = None,
+    settings: Settings = None,
 ) -> None:
     """Validate a case and print what will be run, and about how long it takes.
 

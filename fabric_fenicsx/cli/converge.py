@@ -10,6 +10,7 @@ import typer
 from ..errors import SolveError
 from ..parallel import from_root
 from .collective import collective, say
+from .options import Settings
 
 __all__ = ["converge"]
 
@@ -22,14 +23,7 @@ def converge(
             "--out", metavar="DIR", help="Results; default: results/converge_ and the case's name"
         ),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Put a value over the file's, as --set tow.C1_MPa=3e4. May be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
     only: Annotated[
         str | None,
         typer.Option("--only", metavar="NAME,NAME", help="Of cells, spacing, steps, contact."),

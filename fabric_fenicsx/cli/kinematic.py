@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError, SolveError
+from .options import Settings
 
 __all__ = ["kinematic"]
 
@@ -19,10 +20,7 @@ def kinematic(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Default: results/ and the case's name."),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Put a value over the file's."),
-    ] = None,
+    settings: Settings = None,
     spacing: Annotated[
         float | None,
         typer.Option(

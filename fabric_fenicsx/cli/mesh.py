@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
+from .options import Settings
 from .results import writable
 
 __all__ = ["mesh"]
@@ -19,10 +20,7 @@ def mesh(
         Path | None,
         typer.Option("--out", metavar="FILE.msh", help="Default: the case's name with .msh, here."),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Put a value over the file's."),
-    ] = None,
+    settings: Settings = None,
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw no picture.")] = False,
 ) -> None:
     """Write the tows of a case as a gmsh mesh and draw them.

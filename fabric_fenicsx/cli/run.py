@@ -11,6 +11,7 @@ import typer
 from ..errors import SolveError
 from ..parallel import from_root
 from .collective import collective, say
+from .options import Settings
 
 __all__ = ["run"]
 
@@ -21,14 +22,7 @@ def run(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Results; default: results/ and the case's name"),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Put a value over the file's, as --set tow.C1_MPa=3e4. May be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the last accepted step in DIR.")
     ] = False,

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
 
+from .crossings import crossings_by_tow, node_tows
 from .net import Net
 
 __all__ = ["TowAxes", "axes_shear", "shear_at", "tow_axes"]
@@ -60,16 +61,12 @@ class TowAxes:
         count, size = len(net.crossings), 2 * reach + 1
         nodes = np.zeros((count, 2, size), dtype=np.int64)
         weights = np.zeros((count, 2, size, 3))
-        tow = np.zeros(len(net.points), dtype=np.int64)
-        tow[net.cells.ravel()] = np.repeat(net.cell_tow, 2)
+        tow = node_tows(net)
         for side in (0, 1):
-            order = np.argsort(net.crossings[:, side])  # nodes rise along each tow
-            owner = tow[net.crossings[order, side]]
-            for own in np.split(order, np.flatnonzero(np.diff(owner)) + 1):
-                if len(own):
-                    line = net.crossings[own, side]
-                    ends = net.ends[tow[line[0]]]
-                    nodes[own, side], weights[own, side] = _on_tow(net, line, ends, symmetry, reach)
+            for own in crossings_by_tow(net, side):
+                line = net.crossings[own, side]
+                ends = net.ends[tow[line[0]]]
+                nodes[own, side], weights[own, side] = _on_tow(net, line, ends, symmetry, reach)
         return cls(net, nodes, weights)
 
     def at(self, displacement: Floats) -> Floats:

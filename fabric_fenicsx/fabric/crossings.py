@@ -16,7 +16,14 @@ from scipy.sparse.csgraph import (
 
 from .net import WARP, WEFT, Net
 
-__all__ = ["areas", "crossing_numbers", "reference_angle", "tow_numbers"]
+__all__ = [
+    "areas",
+    "crossing_numbers",
+    "crossings_by_tow",
+    "node_tows",
+    "reference_angle",
+    "tow_numbers",
+]
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -30,7 +37,7 @@ def tow_numbers(net: Net) -> Integers:
     parts, share their number.
     """
     numbers = np.zeros(len(net.tow_family), dtype=np.int64)
-    tow = _node_tows(net)
+    tow = node_tows(net)
     for family in (WARP, WEFT):
         order = np.argsort(net.crossings[:, 1 - family])
         mine, other = tow[net.crossings[order, family]], tow[net.crossings[order, 1 - family]]
@@ -61,7 +68,7 @@ def _counted(before: Integers, after: Integers, size: int) -> Integers:
 
 def crossing_numbers(net: Net) -> tuple[Integers, Integers]:
     """Number of the warp tow and of the weft tow of each crossing, each (n_crossings,)."""
-    numbers, tow = tow_numbers(net), _node_tows(net)
+    numbers, tow = tow_numbers(net), node_tows(net)
     return numbers[tow[net.crossings[:, 0]]], numbers[tow[net.crossings[:, 1]]]
 
 
@@ -90,7 +97,7 @@ def areas(net: Net) -> Floats:
 def _reach(net: Net, side: int) -> Floats:
     """Length [mm] of the warp (0) or weft (1) tow that each crossing stands for."""
     nodes = net.crossings[:, side]
-    tow = _node_tows(net)
+    tow = node_tows(net)
     # Nodes rise along a tow and from tow to tow. The place of a crossing is half-way between its
     # two nodes, which are apart where tows are crimped.
     order = np.argsort(nodes)
@@ -107,7 +114,15 @@ def _reach(net: Net, side: int) -> Floats:
     return reach
 
 
-def _node_tows(net: Net) -> Integers:
+def crossings_by_tow(net: Net, side: int) -> list[Integers]:
+    """Crossings of each warp (0) or weft (1) tow that has any, in the tow's order."""
+    order = np.argsort(net.crossings[:, side])  # nodes rise along each tow
+    owner = node_tows(net)[net.crossings[order, side]]
+    return [own for own in np.split(order, np.flatnonzero(np.diff(owner)) + 1) if len(own)]
+
+
+def node_tows(net: Net) -> Integers:
+    """Tow of each node, shape (n_nodes,)."""
     tow = np.zeros(len(net.points), dtype=np.int64)
     tow[net.cells.ravel()] = np.repeat(net.cell_tow, 2)
     return tow

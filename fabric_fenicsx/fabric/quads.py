@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from .crossings import node_tows
 from .net import Net
 
 __all__ = ["meshes", "next_crossings", "rim_faces"]
@@ -22,7 +23,7 @@ def next_crossings(net: Net) -> tuple[Integers, Integers]:
     Returns:
         Two arrays of shape (n_crossings + 1,), the last entry for what comes after -1.
     """
-    tow = _tows(net)
+    tow = node_tows(net)
     following = np.full((2, len(net.crossings) + 1), -1)
     for side in (0, 1):
         nodes = net.crossings[:, side]
@@ -51,7 +52,7 @@ def rim_faces(net: Net) -> tuple[Integers, Integers, Integers]:
         (k,); faces, (m, 4), in which the number n_crossings + i is the i-th of these ends. A face
         runs from a crossing along its tow as `meshes` does.
     """
-    following, tow = next_crossings(net), _tows(net)
+    following, tow = next_crossings(net), node_tows(net)
     ends: list[int] = []
     before: list[int] = []
     faces: list[tuple[int, int, int, int]] = []
@@ -75,9 +76,3 @@ def rim_faces(net: Net) -> tuple[Integers, Integers, Integers]:
                     corner, other = len(nodes) + at, len(nodes) + number[beside]
                     faces.append((crossing, corner, other, beside))
     return np.array(ends, int), np.array(before, int), np.array(faces, int).reshape(-1, 4)
-
-
-def _tows(net: Net) -> Integers:
-    tow = np.empty(len(net.points), dtype=np.int64)
-    tow[net.cells.ravel()] = np.repeat(net.cell_tow, 2)
-    return tow

@@ -50,7 +50,7 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             "holder_height_mm": row["holder_height_mm"],
             "largest_shear_angle_deg": row["largest_shear_deg"],
             "lowest_point_mm": lowest(net, snapshot.displacement),
-            "kinetic_over_stored_energy": _kinetic_share(outcome.rows),
+            "kinetic_over_stored_energy": summary["health"]["kinetic_over_stored_energy"],
             "points": _points(case, session, net, outcome),
         }
         summary["discretisation_error"] = recovered_error(net, snapshot, mirrors(case))
@@ -90,13 +90,6 @@ def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[d
 def _squeezed(case: DrapeCase) -> bool:
     rubs = case.contact.friction > 0.0 and "holder" not in case.contact.frictionless
     return rubs and case.holder_force_N is None and case.holder_gap_mm < 0.0
-
-
-def _kinetic_share(rows: list[dict[str, float]]) -> float:
-    """Largest ratio of kinetic to stored energy after the first tenth of the run."""
-    return max(
-        row["kinetic_N_mm"] / max(row["stored_N_mm"], 1e-300) for row in rows[len(rows) // 10 :]
-    )
 
 
 def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:

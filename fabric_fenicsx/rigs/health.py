@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import Delaunay, QhullError
 
+from ..fabric.crossings import crossings_by_tow
 from ..fabric.net import WARP, Net
 from ..mechanics.contact import LIMIT
 from ..solving.snapshot import Snapshot
@@ -186,14 +187,10 @@ def spans(net: Net) -> Array:
 def _crossings_of_tows(net: Net) -> list[tuple[Any, Any]]:
     """Crossings of each tow that has two or more, and their nodes on it; these rise along it."""
     found = []
-    tow = np.zeros(len(net.points), dtype=np.int64)
-    tow[net.cells.ravel()] = np.repeat(net.cell_tow, 2)
     for side in (0, 1):
-        order = np.argsort(net.crossings[:, side])
-        nodes = net.crossings[order, side]
-        parts = np.flatnonzero(np.diff(tow[nodes])) + 1
-        pairs = zip(np.split(order, parts), np.split(nodes, parts), strict=True)
-        found += [(own, at) for own, at in pairs if len(at) > 1]
+        for own in crossings_by_tow(net, side):
+            if len(own) > 1:
+                found.append((own, net.crossings[own, side]))
     return found
 
 
