@@ -20,7 +20,7 @@ from ..inputs.validation import suggestion
 from ..rigs.cases import Case
 from .inference.effects import Effect, Variant
 from .inference.experiment import Experiment
-from .inference.fitting import orthogonal_to, weighted
+from .inference.fitting import orthogonal_to
 from .inference.starts import SMALL
 from .kinds import KINDS, kind_of
 from .measurement.reading import write_folder
@@ -219,7 +219,7 @@ def _strengths(
     if not free:
         return values
     without, slopes = experiment.predict((), dict(baseline))
-    J = weighted(slopes, baseline, np.ones(len(without), dtype=bool), np.ones(len(without)))
+    J = np.column_stack([slopes[name] for name in baseline] or [np.zeros((len(without), 0))])
 
     def left(change: Array) -> float:
         return float(np.linalg.norm(orthogonal_to(J, change[:, None]))) / sqrt(len(change))

@@ -3,8 +3,7 @@
 What a number was set on stands beside it:
 
     convention   chosen before any data were looked at, as usual in the field
-    made-up      the sets of tests/measurements, seeds 1 to 16, in the course of which it was set
-    judged       185 sets of somebody who had not read the loop, after which it was changed
+    made-up      sets of tests/measurements, in the course of which it was set
     published    curves read from figures, after which it was changed
 
 A set that a number was set on is no evidence for it. How a record of a motion is cut into pieces,
@@ -32,29 +31,30 @@ class Criteria:
         missed: sigmas, from the median, by which a model misses a reading that it then leaves out;
             made-up.
         most_missed: largest share of a run that may be left out so; made-up.
-        structure_p: probability below which a test says that a residual has structure; convention.
+        structure_p: chance below which a test says that a residual has structure; convention.
         hopeless_p: ... below which no small size excuses that structure; made-up.
-        alarm_p: probability by chance of a score, over all candidates together, below which it is
-            followed where the baseline's residual is otherwise noise; convention.
-        clear_p: ... below which it is enough that parts of the readings are predicted better at
-            all; convention.
-        clearly_better: ... above which their error must fall below this share; made-up.
-        decisive: BIC by which a second effect must win, and by which a rival may lose; convention
-            (Kass & Raftery, J. Am. Stat. Assoc. 90, 1995: very strong evidence).
-        least_gain: BIC by which any effect must win against the baseline; made-up.
-        better_prediction: share of a single effect's cross-validated error below which that of a
-            pair must fall; made-up.
-        near: held-out error over noise up to which a model explains the data; made-up.
-        share_left: share of the baseline's held-out error that may be left where a prediction is
-            uncertain; judged.
-        scatter: scatter over noise up to which a residual without structure is noise: nobody knows
-            their noise better; judged.
-        scatter_with_structure: ... and with some; judged.
+        decisive: −2 log likelihood, penalised, by which a model of more effects must win, and by
+            which a rival may lose; convention (Kass & Raftery, J. Am. Stat. Assoc. 90, 1995: very
+            strong evidence).
+        significant: standard errors that an amplitude must be from nothing; convention.
+        near: error over noise up to which a model explains what it was fitted to, and what it was
+            not, if the residual has structure; made-up.
+        scatter: ... and if it has none: nobody knows their noise better; made-up.
+        usual_scatter: of specimens, as a share of a parameter (half-normal prior); convention.
+        laboratories: ... where they are from several laboratories; published.
+        usual_share: of a reading that its noise grows by (half-normal prior); convention.
+        stated_within: relative sigma of a noise that was stated; convention.
+        readings_per_knot, most_knots: of the smooth line that a misfit is looked for with;
+            convention.
         accuracy: share of the range that a reading is good to where no noise is given; published.
-        blocks: parts that are left out in turn where there is one run; convention.
-        first_effects: the best ones, whose pairs with every other are tried; made-up.
+        blocks: parts, of several stretches each, that are left out in turn where there is one run;
+            convention.
+        stretches: in each of these parts; convention.
+        most_effects: in one model; convention.
+        combinations: of effects that are fitted, of all that are compared to first order; made-up.
         rounds: times that readings are left out, from ever better models; made-up.
-        forms_kept: of an effect, that are fitted again when readings were left out; made-up.
+        said_correlation: of neighbouring readings, above which the report names it; convention.
+        said_quantum: step of the readings over noise, above which it does; convention.
         correlated: correlation of two estimates above which the report names them; convention.
         evaluations: of a model in a fit, at most; ``final_evaluations`` where its numbers are
             reported. A fit that ends there has not converged, and says so.
@@ -72,21 +72,24 @@ class Criteria:
     most_missed: float = 0.03
     structure_p: float = 1e-3
     hopeless_p: float = 1e-8
-    alarm_p: float = 0.01
-    clear_p: float = 1e-3
-    clearly_better: float = 0.8
     decisive: float = 10.0
-    least_gain: float = 4.0
-    better_prediction: float = 0.97
+    significant: float = 2.0
     near: float = 1.15
-    share_left: float = 0.25
     scatter: float = 1.25
-    scatter_with_structure: float = 1.1
+    usual_scatter: float = 0.12
+    laboratories: float = 0.6
+    usual_share: float = 0.05
+    stated_within: float = 0.15
+    readings_per_knot: int = 8
+    most_knots: int = 20
     accuracy: float = 0.005
     blocks: int = 5
-    first_effects: int = 3
-    rounds: int = 3
-    forms_kept: int = 3
+    stretches: int = 4
+    most_effects: int = 3
+    combinations: int = 6
+    rounds: int = 2
+    said_correlation: float = 0.15
+    said_quantum: float = 0.5
     correlated: float = 0.98
     evaluations: int = 60
     final_evaluations: int = 300

@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from .curve import Curve
 from .effects import Effect
 from .experiment import Experiment
 from .fitting import Fit
-from .noise import Whiteness
+from .noise import Noise, Whiteness
 
 __all__ = ["Candidate", "Diagnosis", "Verdict"]
 
@@ -46,6 +47,8 @@ class Diagnosis:
         experiment: the test.
         verdict: what is said in the end.
         noise, noise_source: sigma of a reading and where it comes from.
+        noise_model: of the reported model, or of the one that came nearest.
+        quantum: step of the values that were written; 0 where there is none.
         baseline: the fitted baseline.
         final: the fitted model that is reported; the baseline where nothing was added.
         best: the model that came nearest, where that is not ``final``.
@@ -53,15 +56,20 @@ class Diagnosis:
         rivals: by effect, others that this data cannot tell from it.
         candidates: every effect tried.
         holdout_before, holdout_after, holdout_best: held-out errors of the three models.
+        holdout_expected: what the final model itself expects of its own; NaN without holdout runs.
         holdout_source: how they were come by.
         white_before, white_after: tests of the residuals.
         outliers: readings that were left out, (n,).
+        curve: what readings know that are all on one curve; None where they know more.
+        of_the_curve: effects that are such a curve, where one was looked for.
     """
 
     experiment: Experiment
     verdict: Verdict
     noise: float
     noise_source: str
+    noise_model: Noise
+    quantum: float
     baseline: Fit
     final: Fit
     best: Fit | None
@@ -71,8 +79,11 @@ class Diagnosis:
     holdout_before: float
     holdout_after: float
     holdout_best: float
+    holdout_expected: float
     holdout_source: str
     white_before: Whiteness
     white_after: Whiteness
     outliers: Flags
+    curve: Curve | None = None
+    of_the_curve: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -11,10 +12,16 @@ import numpy.typing as npt
 
 from .effects import Effect, Parameter, Variant
 
-__all__ = ["Experiment", "Law", "Readings"]
+__all__ = ["NO_DEVIATIONS", "Deviations", "Experiment", "Law", "OneCurve", "Readings"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+Numbers = npt.NDArray[np.int64]
+
+Deviations = Mapping[str, Array]
+"""By parameter, how far each specimen is from the common value, as a share, (n_specimens,)."""
+
+NO_DEVIATIONS: Deviations = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,18 +36,30 @@ class Readings:
         weight: 1 over the given sigma of a reading relative to the others, (n,); ones by default.
         names: of the runs.
         covariates: what the residual is shown against, by name with unit, each (n,).
+        specimen: number of the specimen, (n,).
+        specimens: their names.
+        folder: number of the measurement that a reading belongs to, (n,).
+        chain: number of the line of readings, one after the other, that a reading stands in, (n,):
+            along it noise may be correlated.
         row: of each in its file, from 0, (n,), where readings of a run stand in another order; None
             where they do not.
+        model_error: columns b_j, (n, m), of what the model itself is uncertain by: Σ b_j ξ_j with
+            independent ξ_j of variance one; None where that is nothing.
     """
 
     observed: Array
-    run: npt.NDArray[np.int64]
+    run: Numbers
     holdout: Flags
     usable: Flags
     weight: Array
     names: tuple[str, ...]
     covariates: Mapping[str, Array]
-    row: npt.NDArray[np.int64] | None = None
+    specimen: Numbers
+    specimens: tuple[str, ...]
+    folder: Numbers
+    chain: Numbers
+    row: Numbers | None = None
+    model_error: Array | None = None
 
     @property
     def fit(self) -> Flags:
@@ -64,6 +83,22 @@ class Law:
     at: Array
     value: Array
     slopes: Mapping[str, Array]
+
+
+@dataclass(frozen=True, slots=True)
+class OneCurve:
+    """What all fitted readings of a test are a function of.
+
+    Attributes:
+        x, y: names of the axes with their units, as columns of a file.
+        at: x of every reading, (n,).
+        per_reading: reading over y, (n,).
+    """
+
+    x: str
+    y: str
+    at: Array
+    per_reading: Array
 
 
 class Experiment(Protocol):
@@ -91,7 +126,7 @@ class Experiment(Protocol):
 
     @property
     def baseline(self) -> tuple[Parameter, ...]:
-        """Parameters of the baseline; each has one start."""
+        """Parameters of the baseline; each has one start. They may differ between specimens."""
         ...
 
     @property
@@ -104,21 +139,30 @@ class Experiment(Protocol):
         """What a reader of the report has to know of the model."""
         ...
 
+    @property
+    def one_curve(self) -> OneCurve | None:
+        """What all fitted readings are a function of, where the test cannot know more."""
+        ...
+
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law | None:
         """The material law of a model, where the test has one that a curve shows."""
         ...
 
     def predict(
-        self, variants: Sequence[Variant], values: Mapping[str, float]
+        self,
+        variants: Sequence[Variant],
+        values: Mapping[str, float],
+        deviations: Deviations = NO_DEVIATIONS,
     ) -> tuple[Array, dict[str, Array]]:
         """Expected readings, and their derivative in every parameter.
 
         Args:
             variants: the effects in the model, at most one of each name of a parameter.
-            values: of the parameters of the baseline and of the variants.
+            values: of the parameters of the baseline and of the variants, common to all specimens.
+            deviations: of specimens from them: a specimen's parameter is value (1 + deviation).
 
         Returns:
-            The readings, (n,), and by parameter their derivative, (n,).
+            The readings, (n,), and by parameter their derivative in the common value, (n,).
 
         Raises:
             SolveError: the model has no solution there.

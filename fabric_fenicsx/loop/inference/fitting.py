@@ -1,9 +1,16 @@
-"""Weighted least squares of a test's model, with standard errors and what cannot be told apart."""
+"""Generalised least squares of a test's model: common parameters, and how specimens differ.
+
+    |W (y - f(θ, δ))|² + Σ_g |δ_g|²/τ_g²  ->  min
+
+W makes errors white (see noise), a specimen's parameters are θ (1 + δ), and τ is what specimens
+scatter by (see variances): the mode of a mixed-effects model. Where τ is nothing there is no δ.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -12,41 +19,52 @@ from scipy.optimize import least_squares
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Parameter, Variant
-from .experiment import Experiment, Flags
+from .experiment import Experiment, Flags, Readings
+from .variances import Linearised, Variances
 
 __all__ = [
     "Fit",
     "fit",
+    "groups_of",
+    "linearised",
     "orthogonal_to",
     "parameters_of",
     "soft_size",
-    "weighted",
 ]
 
 Array = npt.NDArray[np.float64]
 
 #: Least information about a combination of parameters, as a share of the most: round-off.
 LEAST_KNOWN = 1e-14
+#: Scatter below which specimens are taken to be alike.
+ALIKE = 1e-4
+#: A specimen's parameter keeps its sign.
+LEAST_DEVIATION = -0.95
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A fitted model; two are the same only if they are one object.
 
     Attributes:
         variants: the effects in it.
-        values: parameters by name.
-        std: their standard errors, for a noise of one unit; see ``errors_at``.
+        values: common parameters by name.
+        std: their standard errors; see ``errors``.
         correlated: pairs of parameters that the data hardly tell apart.
         at_bound: parameters that ended on a bound.
         converged: false where the search ended at its cap of evaluations.
         residual: observed minus expected at every reading, used or not, (n,).
-        expected: the model there, (n,).
+        expected: the model there, with the specimens' deviations, (n,).
         used: readings that were fitted, (n,).
-        weight: of the readings, (n,).
-        slopes: weighted derivatives of the expected readings in the parameters, (n, n_values).
-        root: of the parameters' covariance for a noise of one unit, (n_values, n_values): their
-            change with one standard error of independent combinations of them.
+        variances: with which they were.
+        deviations: by group of parameters, of every specimen from the common ones, (n_specimens,);
+            zero of those that were not fitted.
+        slopes: derivatives of the expected readings in the common parameters, then in each
+            specimen's deviations, group by group, (n, n_columns).
+        root: of the covariance of these columns' parameters, (n_columns, n_columns): their change
+            with one standard error of independent combinations of them.
+        white: residuals that were fitted, white, (n_used,).
+        readings: of the test.
     """
 
     variants: tuple[Variant, ...]
@@ -57,19 +75,28 @@ class Fit:
     converged: bool
     residual: Array
     expected: Array
-    used: npt.NDArray[np.bool_]
-    weight: Array
+    used: Flags
+    variances: Variances
+    deviations: dict[str, Array]
     slopes: Array
     root: Array
+    white: Array
+    readings: Readings
+
+    @cached_property
+    def penalty(self) -> float:
+        """Σ δ²/τ² of the specimens."""
+        scatter = self.variances.scatter
+        return sum(float(np.sum((d / scatter[g]) ** 2)) for g, d in self.deviations.items())
 
     @property
     def sum_of_squares(self) -> float:
-        """Of the weighted residuals that were fitted."""
-        return float(np.sum((self.residual * self.weight)[self.used] ** 2))
+        """Of the white residuals that were fitted, and of what specimens had to differ by."""
+        return float(self.white @ self.white) + self.penalty
 
     def size(self, robust: float | None) -> float:
-        """Of the weighted residuals that were fitted; see soft_size."""
-        return soft_size((self.residual * self.weight)[self.used], robust)
+        """The same, where residuals far off count by their size only; see soft_size."""
+        return soft_size(self.white, robust) + self.penalty
 
     @property
     def freedom(self) -> int:
@@ -77,42 +104,48 @@ class Fit:
         return max(int(self.used.sum()) - len(self.values), 1)
 
     def rms(self, rows: Flags) -> float:
-        """Root mean square of the weighted residual at these readings; NaN if there are none."""
-        own = (self.residual * self.weight)[rows]
+        """Root mean square of the residual at these readings; NaN if there are none."""
+        own = (self.residual * self.readings.weight)[rows]
         return float(np.sqrt(np.mean(own**2))) if len(own) else float("nan")
 
     def predictive_rms(self, rows: Flags) -> float:
-        """Root mean square of the weighted residual there, less what the prediction allows for.
+        """Root mean square of the residual over sigma there, less what the prediction allows for.
 
-        A prediction is as uncertain as the parameters it is made with, and its errors go together:
-        with G Gᵀ the covariance of what is expected, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum
-        of squares, by the singular values of G. NaN if there are none.
+        A prediction is as uncertain as the parameters it is made with, those of a specimen that
+        was not fitted among them, and its errors go together: with G Gᵀ the covariance of what is
+        expected, white, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum of squares. NaN if there are
+        none.
         """
-        r, G = (self.residual * self.weight)[rows], self.slopes[rows] @ self.root
-        if len(r) == 0:
+        if not rows.any():
             return float("nan")
+        whiten = self.variances.noise.whitener(self.readings, rows)
+        r, G = whiten(self.residual[rows]), whiten(self.slopes[rows] @ self.root)
         along, size, _ = np.linalg.svd(G, full_matrices=False)
         allowed = float(np.sum((along.T @ r) ** 2 / (1.0 + 1.0 / np.maximum(size, 1e-150) ** 2)))
         return float(np.sqrt(max(float(r @ r) - allowed, 0.0) / len(r)))
 
     def prediction_std(self, rows: Flags) -> float:
-        """Standard error of the expected readings there, rms, for a noise of one unit."""
-        return float(np.sqrt(np.mean(np.sum((self.slopes[rows] @ self.root) ** 2, axis=1))))
+        """Standard error of the expected readings there, root mean square."""
+        weight = self.readings.weight[rows][:, None]
+        square = np.sum((weight * (self.slopes[rows] @ self.root)) ** 2, axis=1)
+        return float(np.sqrt(np.mean(square)))
 
-    def error_of(self, slopes: Mapping[str, Array], noise: float) -> Array:
-        """Standard error of a function of the parameters from its slopes in them, (n,) each."""
+    def error_of(self, slopes: Mapping[str, Array]) -> Array:
+        """Standard error of a function of the common parameters from its slopes, (n,) each."""
         count = len(next(iter(slopes.values())))
         columns = [np.broadcast_to(slopes.get(name, 0.0), count) for name in self.values]
         J = np.column_stack(columns)
-        return np.asarray(np.linalg.norm(J @ self.root, axis=1) * self._scatter(noise))
+        known = self.root[: len(self.values)]
+        return np.asarray(np.linalg.norm(J @ known, axis=1) * self._misfit)
 
-    def errors_at(self, noise: float) -> dict[str, float]:
-        """Standard errors for a noise, or for the scatter about the fit where that is larger."""
-        scatter = self._scatter(noise)
-        return {name: std * scatter for name, std in self.std.items()}
+    @property
+    def errors(self) -> dict[str, float]:
+        """Standard errors, for what is left where that is more than the noise."""
+        return {name: std * self._misfit for name, std in self.std.items()}
 
-    def _scatter(self, noise: float) -> float:
-        return max(noise, float(np.sqrt(self.sum_of_squares / self.freedom)))
+    @property
+    def _misfit(self) -> float:
+        return max(1.0, float(np.sqrt(self.sum_of_squares / self.freedom)))
 
 
 def parameters_of(experiment: Experiment, variants: Sequence[Variant]) -> list[Parameter]:
@@ -120,12 +153,31 @@ def parameters_of(experiment: Experiment, variants: Sequence[Variant]) -> list[P
     return [*experiment.baseline, *(p for v in variants for p in v.parameters)]
 
 
+def groups_of(experiment: Experiment, variants: Sequence[Variant]) -> dict[str, tuple[str, ...]]:
+    """Parameters that may differ between specimens, by group: those of a group differ together.
+
+    Each of the baseline's is one, and the amplitudes of each effect, unless a run has its own. One
+    specimen alone shows no difference.
+    """
+    readings = experiment.readings
+    if len(np.unique(readings.specimen[readings.fit])) < 2:
+        return {}
+    groups: dict[str, tuple[str, ...]] = {p.name: (p.name,) for p in experiment.baseline}
+    for v in variants:
+        own = tuple(p.name for p in v.amplitudes if p.run is None)
+        if own:
+            groups[" ".join(own)] = own
+    return groups
+
+
 def fit(
     experiment: Experiment,
     variants: Sequence[Variant],
     start: Mapping[str, float],
-    used: npt.NDArray[np.bool_],
+    used: Flags,
+    variances: Variances,
     *,
+    deviations: Mapping[str, Array] | None = None,
     evaluations: int = CRITERIA.evaluations,
     robust: float | None = None,
 ) -> Fit:
@@ -134,119 +186,198 @@ def fit(
     Args:
         experiment: the test.
         variants: the effects in its model.
-        start: of every parameter.
+        start: of every common parameter.
         used: the readings to fit, (n,).
+        variances: what readings and specimens scatter by.
+        deviations: of the specimens to begin with; by default none.
         evaluations: of the model at most.
-        robust: a residual beyond which readings count less and less; None for least squares.
+        robust: a white residual beyond which readings count less and less; None for least squares.
 
     Raises:
         SolveError: the model has no solution at the start.
     """
-    parameters = parameters_of(experiment, variants)
-    if not parameters:
-        return _without_parameters(experiment, variants, used)
-    names = [p.name for p in parameters]
-    lower, upper = (np.array([getattr(p, end) for p in parameters]) for end in ("lower", "upper"))
-    readings = experiment.readings
-    weight = readings.weight[used]
-    x0 = np.clip([start[name] for name in names], lower, upper)
-    cache: dict[bytes, tuple[Array, dict[str, Array]]] = {}
+    model = _Model(experiment, variants, used, variances)
+    x0 = model.start(start, deviations or {})
+    if len(x0):
+        result = least_squares(
+            lambda x: model.residual(x, raised=np.array_equal(x, x0)),
+            x0,
+            jac=model.jacobian,
+            bounds=model.bounds,
+            x_scale="jac",
+            xtol=1e-8,
+            ftol=1e-8,
+            gtol=1e-12,
+            max_nfev=evaluations,
+            loss="linear" if robust is None else "soft_l1",
+            f_scale=robust or 1.0,
+        )
+        return model.fitted(result.x, result.active_mask, result.status > 0)
+    return model.fitted(x0, np.zeros(0), True)
 
-    def model(x: Array) -> tuple[Array, dict[str, Array]]:
-        key = x.tobytes()
-        if key not in cache:
-            cache.clear()
-            found = experiment.predict(variants, dict(zip(names, x.tolist(), strict=True)))
-            if not np.isfinite(found[0][used]).all():
-                raise SolveError("the model is not a number at these parameters")
-            cache[key] = found
-        return cache[key]
 
-    def residual(x: Array) -> Array:
+class _Model:
+    """Residuals and derivatives of a model as functions of common parameters and deviations."""
+
+    def __init__(
+        self, experiment: Experiment, variants: Sequence[Variant], used: Flags, variances: Variances
+    ) -> None:
+        self._experiment, self._variants, self._used = experiment, tuple(variants), used
+        self._variances, self._readings = variances, experiment.readings
+        self._parameters = parameters_of(experiment, variants)
+        self._names = [p.name for p in self._parameters]
+        groups = groups_of(experiment, variants)
+        self._groups = {
+            g: names for g, names in groups.items() if variances.scatter.get(g, 0.0) > ALIKE
+        }
+        # All of one run, or of one specimen: the common parameters are its own.
+        self._fitted = np.unique(self._readings.specimen[used])
+        self._whiten = variances.noise.whitener(self._readings, used)
+        self._cache: dict[bytes, tuple[Array, dict[str, Array]]] = {}
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Of all unknowns."""
+        count = len(self._groups) * len(self._fitted)
+        lower = [p.lower for p in self._parameters] + [LEAST_DEVIATION] * count
+        upper = [p.upper for p in self._parameters] + [np.inf] * count
+        return np.array(lower), np.array(upper)
+
+    def start(self, values: Mapping[str, float], deviations: Mapping[str, Array]) -> Array:
+        """Unknowns to begin with, within bounds."""
+        x = [values[name] for name in self._names]
+        for group in self._groups:
+            x += (
+                list(deviations[group][self._fitted])
+                if group in deviations
+                else [0.0] * len(self._fitted)
+            )
+        return np.clip(np.array(x, dtype=float), *self.bounds)
+
+    def residual(self, x: Array, raised: bool) -> Array:
+        """White residuals and what specimens differ by; large where the model has no solution."""
         try:
-            expected = model(x)[0]
+            expected = self._at(x)[0]
         except SolveError:
-            if np.array_equal(x, x0):
+            if raised:
                 raise
             # Out of the model's reach: the trust region shrinks.
-            return np.full(int(used.sum()), 1e6)
-        return np.asarray((expected - readings.observed)[used] * weight)
+            count = int(self._used.sum()) + len(x) - len(self._names)
+            return np.full(count, 1e6)
+        white = self._whiten((expected - self._readings.observed)[self._used])
+        return np.concatenate([white, self._over_scatter(x)])
 
-    def jacobian(x: Array) -> Array:
-        slopes = model(x)[1]
-        return np.column_stack([slopes[name][used] * weight for name in names])
+    def jacobian(self, x: Array) -> Array:
+        """Of ``residual``."""
+        white = self._whiten(self._columns(x, self._fitted)[self._used])
+        count = len(x) - len(self._names)
+        prior = np.zeros((count, len(x)))
+        prior[np.arange(count), len(self._names) + np.arange(count)] = 1.0 / self._scatters(
+            len(self._fitted)
+        )
+        return np.concatenate([white, prior])
 
-    result = least_squares(
-        residual,
-        x0,
-        jac=jacobian,
-        bounds=(lower, upper),
-        x_scale="jac",
-        xtol=1e-8,
-        ftol=1e-8,
-        gtol=1e-12,
-        max_nfev=evaluations,
-        loss="linear" if robust is None else "soft_l1",
-        f_scale=robust or 1.0,
+    def fitted(self, x: Array, active: Array, converged: bool) -> Fit:
+        """The fit that was found."""
+        expected, _ = self._at(x)
+        everyone = np.arange(len(self._readings.specimens))
+        slopes = self._columns(x, everyone)
+        J = np.concatenate(
+            [
+                self._whiten(slopes[self._used]),
+                np.eye(slopes.shape[1])[len(self._names) :]
+                / self._scatters(len(everyone))[:, None],
+            ]
+        )
+        if not np.isfinite(J).all():
+            raise SolveError(f"a derivative in {', '.join(self._names)} is not finite at the fit")
+        std, correlation, root = _uncertainty(J)
+        p = len(self._names)
+        near = np.triu(np.abs(correlation[:p, :p]) > CRITERIA.correlated, 1)
+        residual = self._readings.observed - expected
+        return Fit(
+            variants=self._variants,
+            values=dict(zip(self._names, x[:p].tolist(), strict=True)),
+            std=dict(zip(self._names, std[:p].tolist(), strict=True)),
+            correlated=tuple((self._names[i], self._names[j]) for i, j in np.argwhere(near)),
+            at_bound=tuple(n for n, end in zip(self._names, active, strict=False) if end),
+            converged=bool(converged),
+            residual=residual,
+            expected=expected,
+            used=self._used,
+            variances=self._variances,
+            deviations=self._deviations(x),
+            slopes=slopes,
+            root=root,
+            white=self._whiten(residual[self._used]),
+            readings=self._readings,
+        )
+
+    def _deviations(self, x: Array) -> dict[str, Array]:
+        """By group, of every specimen."""
+        parts = x[len(self._names) :].reshape(len(self._groups), len(self._fitted))
+        found = {}
+        for group, part in zip(self._groups, parts, strict=True):
+            found[group] = np.zeros(len(self._readings.specimens))
+            found[group][self._fitted] = part
+        return found
+
+    def _scatters(self, specimens: int) -> Array:
+        return np.repeat([self._variances.scatter[g] for g in self._groups], specimens)
+
+    def _over_scatter(self, x: Array) -> Array:
+        return np.asarray(x[len(self._names) :] / self._scatters(len(self._fitted)))
+
+    def _at(self, x: Array) -> tuple[Array, dict[str, Array]]:
+        key = x.tobytes()
+        if key not in self._cache:
+            self._cache.clear()
+            values = dict(zip(self._names, x[: len(self._names)].tolist(), strict=True))
+            deviations = {
+                name: deviation
+                for group, deviation in self._deviations(x).items()
+                for name in self._groups[group]
+            }
+            found = self._experiment.predict(self._variants, values, deviations)
+            if not np.isfinite(found[0][self._used]).all():
+                raise SolveError("the model is not a number at these parameters")
+            self._cache[key] = found
+        return self._cache[key]
+
+    def _columns(self, x: Array, specimens: npt.NDArray[np.int64]) -> Array:
+        """Derivatives in common parameters and in these specimens' deviations, (n, n_columns)."""
+        slopes = self._at(x)[1]
+        columns = [slopes[name] for name in self._names]
+        value = dict(zip(self._names, x, strict=False))
+        for group, deviation in self._deviations(x).items():
+            # θ (1 + δ): from the derivative in θ to that in δ.
+            whole = sum(slopes[name] * value[name] for name in self._groups[group])
+            whole = whole / (1.0 + deviation[self._readings.specimen])
+            columns += [whole * (self._readings.specimen == s) for s in specimens]
+        return np.column_stack(columns) if columns else np.zeros((len(self._used), 0))
+
+
+def linearised(experiment: Experiment, model: Fit) -> Linearised:
+    """A fitted model to first order about the common parameters, for its variance components."""
+    rows, count = model.used, len(model.values)
+    groups = groups_of(experiment, model.variants)
+    free = [k for k, name in enumerate(model.values) if name not in model.at_bound]
+    specimen = model.readings.specimen
+    residual = model.residual[rows].copy()
+    specimens: dict[str, Array] = {}
+    everyone = np.arange(len(model.readings.specimens))
+    place = {name: k for k, name in enumerate(model.values)}
+    for group, names in groups.items():
+        own_slopes = [model.slopes[:, place[name]] * model.values[name] for name in names]
+        whole = np.sum(own_slopes, axis=0)
+        if group in model.deviations:
+            own = model.deviations[group][specimen]
+            whole = whole / (1.0 + own)
+            residual += (whole * own)[rows]
+        specimens[group] = (whole[:, None] * (specimen[:, None] == everyone))[rows]
+    return Linearised(
+        residual, model.slopes[:, :count][:, free][rows], specimens, model.readings, rows
     )
-    expected, _ = model(result.x)
-    J = jacobian(result.x)
-    if not np.isfinite(J).all():
-        raise SolveError(f"a derivative in {', '.join(names)} is not finite at the fit")
-    std, correlation, root = _uncertainty(J)
-    every = np.column_stack([model(result.x)[1][name] * readings.weight for name in names])
-    near = np.triu(np.abs(correlation) > CRITERIA.correlated, 1)
-    return Fit(
-        variants=tuple(variants),
-        values=dict(zip(names, result.x.tolist(), strict=True)),
-        std=dict(zip(names, std.tolist(), strict=True)),
-        correlated=tuple((names[i], names[j]) for i, j in np.argwhere(near)),
-        at_bound=tuple(np.array(names)[result.active_mask != 0].tolist()),
-        converged=result.status > 0,
-        residual=readings.observed - expected,
-        expected=expected,
-        used=used,
-        weight=readings.weight,
-        slopes=every,
-        root=root,
-    )
-
-
-def _without_parameters(
-    experiment: Experiment, variants: Sequence[Variant], used: npt.NDArray[np.bool_]
-) -> Fit:
-    """A model that has nothing to fit."""
-    expected, _ = experiment.predict(variants, {})
-    readings = experiment.readings
-    return Fit(
-        variants=tuple(variants),
-        values={},
-        std={},
-        correlated=(),
-        at_bound=(),
-        converged=True,
-        residual=readings.observed - expected,
-        expected=expected,
-        used=used,
-        weight=readings.weight,
-        slopes=np.zeros((len(expected), 0)),
-        root=np.zeros((0, 0)),
-    )
-
-
-def weighted(
-    slopes: Mapping[str, Array], names: Iterable[str], rows: Flags, weight: Array
-) -> Array:
-    """Weighted derivatives in some parameters, (n_rows, n_names); there may be none.
-
-    Args:
-        slopes: by parameter, (n,).
-        names: of the parameters.
-        rows: readings, (n,).
-        weight: of the readings, (n,).
-    """
-    own = [slopes[name][rows] * weight[rows] for name in names]
-    return np.column_stack(own) if own else np.zeros((int(rows.sum()), 0))
 
 
 def without(experiment: Experiment, model: Fit, variants: Sequence[Variant]) -> Fit:
@@ -288,10 +419,11 @@ def orthogonal_to(J: Array, columns: Array) -> Array:
 def _uncertainty(J: Array) -> tuple[Array, Array, Array]:
     """Standard errors (infinite where nothing depends on it), correlations, root of the covariance.
 
-    All for a noise of one unit; the covariance is root rootᵀ, without what nothing depends on.
-    Combinations of parameters that the data say nothing about are as uncertain as round-off allows
-    to tell.
+    The covariance is root rootᵀ, without what nothing depends on. Combinations of parameters that
+    the data say nothing about are as uncertain as round-off allows to tell.
     """
+    if J.shape[1] == 0:
+        return np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0))
     scale = np.linalg.norm(J, axis=0)
     dead = scale == 0.0
     safe = np.where(dead, 1.0, scale)

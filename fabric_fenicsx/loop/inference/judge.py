@@ -1,45 +1,67 @@
-"""When a model explains the data: noise in what was fitted, and the held-out error near the noise.
+"""When a model explains the data, and which of two models is better.
 
-A prediction is as uncertain as the parameters it is made with: what was held out is judged by
-r · (1 + G Gᵀ)⁻¹ r (see Fit.predictive_rms), what is reported is the error itself.
+    criterion = −2 log L + k ln n + 2 Σ ln(forms of the effect) + 2 ln(sets of as many effects)
+
+L is the likelihood with specimens' deviations integrated out and the noise as the model itself
+leaves it (see variances): an approximation to −2 log of its evidence (Schwarz, Ann. Stat. 6, 1978),
+with the chance of finding something among so many forms allowed for. A model explains the data if
+its residual is noise, in size and in structure, in the readings it was fitted to and in those it
+was not; noise is what is printed. Holdout runs are looked at for that alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from math import comb, log
 
 import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
-from ...errors import SolveError
 from .criteria import CRITERIA
-from .effects import Variant
+from .effects import Effect
 from .experiment import Experiment
-from .fitting import Fit, fit, soft_size
-from .noise import Whiteness, estimated_noise, missed_readings, outliers, whiteness
+from .fitting import Fit, linearised
+from .noise import Whiteness, missed_readings, outliers, whiteness
+from .validation import CrossValidation, cross_validated, parts_by, stretches
+from .variances import Estimate, Variances, chance_of_no_misfit, estimate
 
-__all__ = ["CrossValidation", "Judge", "has_own"]
+__all__ = ["Judge", "Misfit", "Model"]
 
-Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
-class CrossValidation:
-    """How well parts of the fitted readings are predicted from the others.
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """A fitted model with its variance components; two are the same only if they are one object.
 
     Attributes:
-        error: root mean square; NaN where no part could be predicted.
-        parts: that were left out in turn.
-        failed: those of them that could not be predicted: too few readings are left, or the model
-            has no solution there.
+        fit: the parameters.
+        effects: in it, in the order of the fit's variants.
+        estimate: of the variance components.
+        criterion: see the module's docstring; smaller is better.
     """
 
-    error: float
-    parts: int
-    failed: int
+    fit: Fit
+    effects: tuple[Effect, ...]
+    estimate: Estimate
+    criterion: float
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """What a model leaves beside noise.
+
+    Attributes:
+        variances: components with a smooth line through each run allowed for: the noise is what
+            is left of readings next to each other.
+        noise: root mean square of that over the fitted readings.
+        whiteness: tests of what the model leaves.
+    """
+
+    variances: Variances
+    noise: float
+    whiteness: Whiteness
 
 
 class Judge:
@@ -47,172 +69,183 @@ class Judge:
 
     Args:
         experiment: the test.
+        effects: that may be found.
 
     Attributes:
         outliers: readings that are left out, (n,).
-        given: whether the noise was given.
-        noise: one sigma of a reading; NaN where it is not given and has not been estimated.
+        given: one sigma of a reading as it was stated; None where it was not.
     """
 
-    def __init__(self, experiment: Experiment) -> None:
+    def __init__(self, experiment: Experiment, effects: list[Effect]) -> None:
         self._experiment, self._readings = experiment, experiment.readings
+        self._effects = effects
         self.outliers: Flags = np.zeros(len(self._readings.observed), dtype=bool)
-        self.given = experiment.noise is not None
-        self.noise = float("nan") if experiment.noise is None else experiment.noise
-        self._validated: dict[Fit, CrossValidation] = {}
+        self.given = experiment.noise
+        several = len(np.unique(self._readings.folder[self._readings.fit])) > 1
+        self._usual = CRITERIA.laboratories if several else CRITERIA.usual_scatter
+        self._misfits: dict[Fit, Misfit] = {}
+        self._validated: dict[tuple[Fit, bool], CrossValidation] = {}
 
     @property
     def rows(self) -> Flags:
-        """Readings that are fitted, (n,)."""
-        return np.asarray(self._readings.fit & ~self.outliers)
+        """Readings that are fitted."""
+        return self._readings.fit & ~self.outliers
 
     @property
     def held_rows(self) -> Flags:
-        """Readings that are held out, (n,)."""
-        return np.asarray(self._readings.holdout & self._readings.usable & ~self.outliers)
+        """Readings of holdout runs that an error is reported for."""
+        return self._readings.holdout & self._readings.usable & ~self.outliers
 
     def leave_out(self, model: Fit) -> bool:
-        """Leave out what stands out from a model's residual, and only that; whether it is other.
-
-        What stood out from a lesser model may be just what the better one explains.
-        """
-        rows = self._readings.usable
-        found = outliers(model.residual, self._readings, rows)
-        found |= missed_readings(model.residual, self._readings, rows & ~found)
+        """Leave out readings that stand out from a model; whether they are others than before."""
+        z = model.residual / model.variances.noise.sigma(self._readings)
+        usable = self._readings.usable
+        found = outliers(z, self._readings, usable)
+        found |= missed_readings(z, self._readings, usable & ~found)
         changed = bool((found != self.outliers).any())
         self.outliers = found
         return changed
 
-    def estimate_noise(self, model: Fit) -> None:
-        """Take the noise from a model's residual, where it is not given."""
-        if not self.given:
-            self.noise = estimated_noise(model.residual, self._readings, self.rows)
+    # Comparison ---------------------------------------------------------------------------
 
-    def bic(self, model: Fit | None, noise: float | None = None) -> float:
-        """χ² + k ln n (Schwarz); smaller is better. Residuals far off count by their size only."""
-        if model is None:
-            return float("inf")
-        z = (model.residual * model.weight)[model.used] / (noise or self.noise)
-        return soft_size(z, CRITERIA.far) + len(model.values) * float(
-            np.log(max(model.used.sum(), 2))
+    def components(self, model: Fit, *, smooth: bool = False) -> Estimate:
+        """Variance components of a fitted model."""
+        return estimate(
+            linearised(self._experiment, model),
+            model.variances,
+            given=self.given,
+            smooth=smooth,
+            usual_scatter=self._usual,
         )
 
-    def whiteness(self, model: Fit) -> Whiteness:
-        """Tests of what a model leaves in the fitted readings."""
-        return whiteness(
-            model.residual, self.noise, self.given, len(model.values), self._readings, self.rows
+    def weighed(self, model: Fit, effects: tuple[Effect, ...]) -> Model:
+        """A fitted model with its variance components and criterion."""
+        found = self.components(model)
+        return Model(model, effects, found, found.likelihood + self.cost(model, effects))
+
+    def cost(self, model: Fit, effects: tuple[Effect, ...]) -> float:
+        """What a model pays for its parameters and for the number of its kind."""
+        free = len(model.values) - len(model.at_bound)
+        forms = sum(log(max(len(effect.variants), 1)) for effect in effects)
+        sets = log(max(comb(len(self._effects), len(effects)), 1))
+        return free * log(max(int(model.used.sum()), 2)) + 2.0 * (forms + sets)
+
+    # Verdict ------------------------------------------------------------------------------
+
+    def misfit(self, model: Model) -> Misfit:
+        """What a model leaves beside noise."""
+        if model.fit not in self._misfits:
+            rows = model.fit.used
+            lined = self.components(model.fit, smooth=True)
+            noise = lined.variances.noise.typical(self._readings, rows)
+            if self.given and 1.0 / CRITERIA.scatter < noise / self.given < CRITERIA.scatter:
+                noise = self.given
+            own = model.estimate.variances.noise.typical(self._readings, rows)
+            white = whiteness(
+                model.estimate.white * own / noise,
+                self.given is not None,
+                len(model.fit.values),
+                self._readings,
+                rows,
+                chance_of_no_misfit(lined, model.estimate),
+            )
+            self._misfits[model.fit] = Misfit(lined.variances, noise, white)
+        return self._misfits[model.fit]
+
+    def fits(self, model: Model) -> bool:
+        """Whether a model leaves noise, in size, on what it was fitted to."""
+        found = self.misfit(model)
+        if found.whiteness.least < CRITERIA.hopeless_p:
+            return False
+        used, freedom = model.fit.used, model.fit.freedom
+        left = model.fit.rms(used) * float(np.sqrt(used.sum() / freedom))
+        allowed = CRITERIA.near if found.whiteness.structured else CRITERIA.scatter
+        return left <= found.noise * max(allowed, self._by_chance(model, freedom))
+
+    def explains(self, model: Model) -> bool:
+        """Whether a model leaves noise, in what it was fitted to and in what it was not."""
+        return self.fits(model) and self.foretells(model)
+
+    def foretells(self, model: Model) -> bool:
+        """Whether a model predicts what was left out, as well as its parameters are known."""
+        out = self.held_rows
+        if out.any():
+            error = model.fit.predictive_rms(out)
+            count = int(out.sum())
+        else:
+            error = self.left_out(model.fit).predictive
+            count = int(model.fit.used.sum())
+        noise = model.fit.variances.noise.typical(self._readings, model.fit.used)
+        limit = max(CRITERIA.scatter, self._by_chance(model, count))
+        return bool(error * noise <= limit * max(self.misfit(model).noise, 0.0))
+
+    def settled(self, model: Model) -> bool:
+        """Whether a model leaves noise alone."""
+        white = self.misfit(model).whiteness
+        return not white.structured and self.explains(model)
+
+    def improves(self, model: Model, on: Model) -> bool:
+        """Whether stretches of the fitted readings are predicted better than by another model."""
+        mine, other = (self.by_stretches(m.fit).predictive for m in (model, on))
+        own = [m.fit.variances.noise.typical(self._readings, m.fit.used) for m in (model, on)]
+        # Half a standard error of the error itself.
+        slack = 1.0 + 0.5 / np.sqrt(max(int(model.fit.used.sum()), 1))
+        return bool(mine * own[0] < slack * other * own[1])
+
+    def significant(self, model: Model) -> bool:
+        """Whether every effect's amplitude is more than its standard error."""
+        errors = model.fit.errors
+        return all(
+            any(
+                abs(model.fit.values[p.name]) > CRITERIA.significant * errors[p.name]
+                for p in variant.amplitudes
+            )
+            for variant in model.fit.variants
         )
-
-    def fits(self, model: Fit) -> bool:
-        """Whether a model leaves noise, in size, on what was fitted."""
-        white = self.whiteness(model)
-        # Of an estimated noise the means over stretches may be too large by themselves.
-        if min(white.lags, white.period, white.blocks if self.given else 1.0) < CRITERIA.hopeless_p:
-            return False
-        scatter = np.sqrt(model.sum_of_squares / model.freedom) / self.accuracy
-        allowed = CRITERIA.scatter_with_structure if white.structured else CRITERIA.scatter
-        return bool(scatter <= max(allowed, _upper(model.freedom)))
-
-    def explains(self, model: Fit, baseline: Fit) -> bool:
-        """Whether a model leaves noise, on what was fitted and on what was held out."""
-        if not self.fits(model):
-            return False
-        out = self.held_rows
-        if not out.any():
-            return int(self.rows.sum()) > len(model.values)
-        if not model.variants:
-            return model.predictive_rms(out) <= self._limit(out, CRITERIA.scatter)
-        if model.predictive_rms(out) > self._limit(out):
-            return False
-        # An effect whose prediction is uncertain takes most of the error away.
-        expected = self._limit(out) * np.sqrt(1.0 + model.prediction_std(out) ** 2)
-        return model.rms(out) <= max(expected, CRITERIA.share_left * baseline.rms(out))
-
-    def predicts(self, model: Fit) -> bool:
-        """Whether a model predicts what was held out, as if its parameters were exact."""
-        return self.excess_error(model) == 0.0
-
-    def excess_error(self, model: Fit) -> float:
-        """Held-out error beyond that of a right model with exact parameters."""
-        out = self.held_rows
-        return max(model.rms(out) - self._limit(out), 0.0) if out.any() else 0.0
-
-    @property
-    def accuracy(self) -> float:
-        """What a reading is good to, with the standard error of an estimate from n readings.
-
-        A curve read from a figure scatters less than it is right.
-        """
-        if self.given:
-            return self.noise
-        estimated = self.noise * (1.0 + 2.0 / np.sqrt(max(int(self.rows.sum()), 1)))
-        return max(estimated, CRITERIA.accuracy * float(np.ptp(self._readings.observed[self.rows])))
 
     def holdout(self, model: Fit) -> float:
         """Held-out error: of the holdout runs, or of each part predicted from the others."""
         out = self.held_rows
-        return model.rms(out) if out.any() else self.cross_validated(model).error
+        return model.rms(out) if out.any() else self.left_out(model).error
+
+    def expected_holdout(self, model: Fit, noise: float) -> float:
+        """What the model itself expects the held-out error of holdout runs to be; NaN without."""
+        out = self.held_rows
+        return float(np.hypot(noise, model.prediction_std(out))) if out.any() else float("nan")
 
     @property
     def source(self) -> str:
         """Where held-out errors come from, in words."""
         if self.held_rows.any():
             return "holdout runs"
-        by_run = len(np.unique(self._readings.run[self.rows])) > 1
-        return "leave one run out" if by_run else f"leave one of {CRITERIA.blocks} blocks out"
+        if self._several_runs:
+            return "leave one run out"
+        return f"leave one of {CRITERIA.blocks} interleaved parts out"
 
-    def cross_validated(self, model: Fit) -> CrossValidation:
-        """How well each part of the fitted readings is predicted from the others."""
-        if model not in self._validated:
-            self._validated[model] = self._cross_validate(model)
-        return self._validated[model]
+    @property
+    def _several_runs(self) -> bool:
+        return len(np.unique(self._readings.run[self.rows])) > 1
 
-    def _cross_validate(self, model: Fit) -> CrossValidation:
-        parts = self._parts()
-        total, count, failed = 0.0, 0, 0
-        for part in parts:
-            rest = self.rows & ~part
-            variants = _within(model.variants, self._readings.run[rest])
-            try:
-                if rest.sum() <= len(model.values) or not part.any():
-                    raise SolveError("too few readings")
-                again = fit(self._experiment, variants, model.values, rest, evaluations=25)
-            except SolveError:
-                failed += 1
-                continue
-            total += float(np.sum((again.residual * again.weight)[part] ** 2))
-            count += int(part.sum())
-        error = float(np.sqrt(total / count)) if count else float("nan")
-        return CrossValidation(error, len(parts), failed)
+    def left_out(self, model: Fit) -> CrossValidation:
+        """Runs predicted from other runs; of a single run interleaved parts."""
+        if not self._several_runs:
+            return self.by_stretches(model)
+        key = (model, True)
+        if key not in self._validated:
+            parts = parts_by(self._readings.run, model.used)
+            self._validated[key] = cross_validated(self._experiment, model, parts)
+        return self._validated[key]
 
-    def _parts(self) -> list[Flags]:
-        """Parts of the fitted readings to be left out in turn."""
-        run = self._readings.run
-        runs = np.unique(run[self.rows])
-        if len(runs) > 1:
-            return [self.rows & (run == number) for number in runs]
-        blocks = np.array_split(np.flatnonzero(self.rows), CRITERIA.blocks)
-        return [np.isin(np.arange(len(run)), block) for block in blocks]
+    def by_stretches(self, model: Fit) -> CrossValidation:
+        """Interleaved parts of all runs predicted from the rest."""
+        key = (model, False)
+        if key not in self._validated:
+            parts = stretches(self._readings, model.used)
+            self._validated[key] = cross_validated(self._experiment, model, parts)
+        return self._validated[key]
 
-    def _limit(self, out: Flags, least: float = CRITERIA.near) -> float:
-        return self.accuracy * max(least, _upper(int(out.sum())))
-
-
-def has_own(variants: Sequence[Variant]) -> bool:
-    """Whether some parameter of a model belongs to one run alone."""
-    return any(p.run is not None for v in variants for p in v.parameters)
-
-
-def _within(variants: Sequence[Variant], runs: npt.NDArray[np.int64]) -> tuple[Variant, ...]:
-    """The same without the parameters of other runs."""
-    return tuple(
-        replace(v, parameters=tuple(p for p in v.parameters if p.run is None or p.run in runs))
-        if has_own([v])
-        else v
-        for v in variants
-    )
-
-
-def _upper(freedom: int) -> float:
-    """Scatter over noise that is exceeded by chance once in a thousand."""
-    return float(np.sqrt(chi2.isf(1e-3, max(freedom, 1)) / max(freedom, 1)))
+    def _by_chance(self, model: Model, count: int) -> float:
+        """Scatter over noise that is exceeded by chance once in a thousand."""
+        phi = model.estimate.variances.noise.correlation
+        independent = max(count * (1.0 - phi) / (1.0 + phi), 1.0)
+        return float(np.sqrt(chi2.isf(1e-3, independent) / independent))

@@ -1,4 +1,11 @@
-"""Is a residual noise? How large noise is, which readings are outliers, what is left in it."""
+"""What readings scatter by: a floor, a share of the reading, and what neighbours have in common.
+
+    σ_i² = (floor² + share² y_i²) / weight_i²,    corr(e_i, e_j) = φ^|i − j| in a line of readings
+
+A vector of readings is made white by dividing by σ and taking off φ times its neighbour (first
+order autoregression); where the model itself is uncertain by B ξ, that comes off as well:
+(I + B Bᵀ)^(-1/2) by the singular values of B.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +19,83 @@ from scipy.stats import chi2
 from .criteria import CRITERIA
 from .experiment import Readings
 
-__all__ = ["Whiteness", "estimated_noise", "missed_readings", "outliers", "whiteness"]
+__all__ = [
+    "Noise",
+    "Whitener",
+    "Whiteness",
+    "estimated_noise",
+    "missed_readings",
+    "outliers",
+    "quantum",
+    "whiteness",
+]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+
+
+class Whitener:
+    """From errors of some readings to independent ones of variance one.
+
+    Args:
+        sigma: of each reading, (n,).
+        neighbour: correlation with the reading before, zero at the start of a line, (n,).
+        model_error: columns of the model's own error, (n, m).
+    """
+
+    def __init__(self, sigma: Array, neighbour: Array, model_error: Array | None = None) -> None:
+        self._sigma, self._neighbour = sigma, neighbour
+        self._left = np.sqrt(1.0 - neighbour**2)
+        self._along: Array | None = None
+        self.log_determinant = float(2.0 * np.sum(np.log(sigma)) + 2.0 * np.sum(np.log(self._left)))
+        if model_error is not None and model_error.size:
+            along, size, _ = np.linalg.svd(self(model_error), full_matrices=False)
+            self._taken = 1.0 - 1.0 / np.sqrt(1.0 + size**2)
+            self._along = along
+            self.log_determinant += float(np.sum(np.log1p(size**2)))
+
+    def __call__(self, errors: Array) -> Array:
+        """White ones of the same shape, (n,) or (n, k)."""
+        shape = (-1,) + (1,) * (errors.ndim - 1)
+        u = errors / self._sigma.reshape(shape)
+        w = u.copy()
+        w[1:] -= self._neighbour[1:].reshape(shape) * u[:-1]
+        w /= self._left.reshape(shape)
+        if self._along is not None:
+            w = w - self._along @ (self._taken.reshape(shape) * (self._along.T @ w))
+        return w
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """A model of noise.
+
+    Attributes:
+        floor: one sigma of a small reading, in the reading's unit.
+        share: of the reading that is added to it, in squares.
+        correlation: φ of neighbours in a line.
+    """
+
+    floor: float
+    share: float = 0.0
+    correlation: float = 0.0
+
+    def sigma(self, readings: Readings) -> Array:
+        """Of each reading, (n,)."""
+        return np.hypot(self.floor, self.share * readings.observed) / readings.weight
+
+    def typical(self, readings: Readings, rows: Flags) -> float:
+        """Root mean square over some readings: what is printed, and judged by."""
+        return float(np.sqrt(np.mean((self.sigma(readings) * readings.weight)[rows] ** 2)))
+
+    def whitener(self, readings: Readings, rows: Flags) -> Whitener:
+        """For some readings."""
+        at = np.flatnonzero(rows)
+        same = readings.chain[at[1:]] == readings.chain[at[:-1]]
+        neighbour = np.zeros(len(at))
+        neighbour[1:] = np.where(same, self.correlation ** np.diff(at), 0.0)
+        error = readings.model_error
+        return Whitener(self.sigma(readings)[at], neighbour, None if error is None else error[at])
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,17 +107,24 @@ class Whiteness:
         blocks: of the means over stretches of readings.
         lags: of the correlations between readings a few apart (Ljung & Box).
         period: of the highest peak of the periodogram (Lomb & Scargle).
+        smooth: of what a smooth line through each run takes off.
     """
 
     size: float
     blocks: float
     lags: float
     period: float
+    smooth: float = 1.0
+
+    @property
+    def least(self) -> float:
+        """The smallest of those that look for structure."""
+        return min(self.blocks, self.lags, self.period, self.smooth)
 
     @property
     def structured(self) -> bool:
         """Something is left in the residual, whatever its size."""
-        return min(self.blocks, self.lags, self.period) < CRITERIA.structure_p
+        return self.least < CRITERIA.structure_p
 
 
 def estimated_noise(residual: Array, readings: Readings, rows: Flags) -> float:
@@ -61,16 +148,35 @@ def estimated_noise(residual: Array, readings: Readings, rows: Flags) -> float:
     return float(1.4826 * np.median(np.abs(np.concatenate(found))))
 
 
-def outliers(residual: Array, readings: Readings, rows: Flags) -> Flags:
-    """Readings that stand out from both their neighbours, which agree with each other, (n,)."""
-    found = np.zeros(len(residual), dtype=bool)
-    r_all = residual * readings.weight
+def quantum(readings: Readings, rows: Flags) -> float:
+    """Step of the values that were written, where all are multiples of one; else zero."""
+    values = np.unique(readings.observed[rows])
+    if len(values) < 4:
+        return 0.0
+    steps = np.diff(values)
+    steps = steps[steps > 1e-9 * np.abs(values).max()]
+    if len(steps) == 0:
+        return 0.0
+    step = float(steps.min())
+    multiples = steps / step
+    return step if np.all(np.abs(multiples - np.round(multiples)) < 1e-3 * multiples) else 0.0
+
+
+def outliers(z: Array, readings: Readings, rows: Flags) -> Flags:
+    """Readings that stand out from both their neighbours, which agree with each other, (n,).
+
+    Args:
+        z: residual over sigma, (n,).
+        readings: of the test.
+        rows: to be looked at, (n,).
+    """
+    found = np.zeros(len(z), dtype=bool)
     for run in range(len(readings.names)):
         while True:
             own = np.flatnonzero(rows & ~found & (readings.run == run))
             if len(own) < 7:
                 break
-            r = r_all[own]
+            r = z[own]
             before, after = r[1:-1] - r[:-2], r[1:-1] - r[2:]
             sigma = 1.4826 * float(np.median(np.abs(before + after))) / np.sqrt(6.0)
             alone = np.minimum(np.abs(before), np.abs(after)) * (before * after > 0.0)
@@ -85,13 +191,13 @@ def outliers(residual: Array, readings: Readings, rows: Flags) -> Flags:
     return found
 
 
-def missed_readings(residual: Array, readings: Readings, rows: Flags) -> Flags:
+def missed_readings(z: Array, readings: Readings, rows: Flags) -> Flags:
     """Readings that a model misses by far while it meets all but a few of their run, (n,).
 
     By themselves or two side by side; none of a run where there are more together, or more than a
     few: then it is the model that is wrong.
     """
-    z = np.abs(residual * readings.weight)
+    z = np.abs(z)
     scale = 1.4826 * float(np.median(z[rows])) if rows.any() else 0.0
     found = np.zeros(len(z), dtype=bool)
     for run in range(len(readings.names)):
@@ -104,25 +210,24 @@ def missed_readings(residual: Array, readings: Readings, rows: Flags) -> Flags:
 
 
 def whiteness(
-    residual: Array, noise: float, given: bool, parameters: int, readings: Readings, rows: Flags
+    white: Array, given: bool, parameters: int, readings: Readings, rows: Flags, smooth: float = 1.0
 ) -> Whiteness:
-    """Test a residual.
+    """Test a residual that should be white.
 
     Args:
-        residual: (n,).
-        noise: sigma of a reading.
-        given: whether it was given rather than estimated from this residual.
+        white: (n_rows,), of variance one.
+        given: whether its variance was given rather than estimated from it.
         parameters: that have been fitted.
         readings: of the test.
-        rows: readings to test.
+        rows: to which ``white`` belongs, (n,).
+        smooth: see Whiteness.
     """
-    z = residual * readings.weight / noise
-    count = int(rows.sum())
-    size = float(chi2.sf(np.sum(z[rows] ** 2), max(count - parameters, 1))) if given else 1.0
+    size = float(chi2.sf(np.sum(white**2), max(len(white) - parameters, 1))) if given else 1.0
     sums, blocks = 0.0, 0
     lags, terms, periods = 0.0, 0, 1.0
+    run_of = readings.run[rows]
     for run in range(len(readings.names)):
-        own = z[rows & (readings.run == run)]
+        own = white[run_of == run]
         if len(own) < 8:
             continue
         parts = np.array_split(own, int(np.clip(len(own) // 6, 1, 12)))
@@ -146,4 +251,5 @@ def whiteness(
         blocks=float(chi2.sf(sums, max(blocks, 1))) if blocks else 1.0,
         lags=float(chi2.sf(lags, max(terms, 1))) if terms else 1.0,
         period=periods,
+        smooth=smooth,
     )

@@ -13,9 +13,10 @@ from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Parameter, Variant
 from .experiment import Experiment
-from .fitting import Fit, fit, parameters_of, soft_size, weighted
+from .fitting import Fit, fit, linearised, parameters_of, soft_size
+from .variances import Variances
 
-__all__ = ["SMALL", "Signature", "fit_from_grid", "signatures"]
+__all__ = ["SMALL", "Combination", "Signature", "ToFirstOrder", "fit_combinations", "signatures"]
 
 Array = npt.NDArray[np.float64]
 
@@ -27,60 +28,69 @@ DAMPED = (1.0, 0.3, 0.1, 0.0)
 AROUND = (np.linspace(0.7, 1.3, 25), np.linspace(0.975, 1.025, 11))
 
 
-def fit_from_grid(
+Combination = tuple[tuple[Variant, "Signature"], ...]
+"""Forms of different effects, each with a shape of it."""
+
+
+def fit_combinations(
     experiment: Experiment,
     base: Fit,
-    variants: Sequence[Variant],
+    combinations: Sequence[Combination],
+    variances: Variances,
     *,
     starts: int = 2,
     evaluations: int = CRITERIA.evaluations,
     robust: float | None = None,
     known: float = float("inf"),
 ) -> list[Fit]:
-    """Add one of several forms of an effect to a fitted model.
+    """Add effects to the fitted baseline: of each combination of forms the most promising shapes.
 
-    Every form is first judged to first order, from its signatures; the most promising start of
-    each is fitted, and others that fit nearly as well as the best of all to first order.
+    Each is first judged to first order, from the signatures; the most promising start of each
+    combination of forms is fitted, and others that are nearly as good as the best of all.
 
     Args:
         experiment: the test.
-        base: the model so far.
-        variants: the forms; those that share a parameter with the model are left out.
-        starts: how many starts of each form are followed.
+        base: the fitted baseline, about which the signatures are.
+        combinations: forms with their shapes.
+        variances: what readings and specimens scatter by.
+        starts: how many starts of each combination of forms are followed.
         evaluations: of the model at most, from each.
         robust: see fit.
         known: sum of squares that some other model leaves.
 
     Returns:
-        The model with each form that has a solution.
+        The model with each combination of forms that has a solution.
     """
-    promising: list[tuple[Variant, _Start]] = []
-    for variant in variants:
-        if set(base.values) & {p.name for p in variant.parameters}:
-            continue
-        own: list[_Start] = []
-        for one in signatures(experiment, base, variant, amplitudes=True):
-            model = (*base.variants, variant)
-            start = _to_first_order(experiment, base, model, one, robust)
-            if start is not None:
-                own.append(start)
+    linear = ToFirstOrder(experiment, base, variances, robust)
+    by_forms: dict[tuple[Variant, ...], list[_Start]] = {}
+    for combination in combinations:
+        start = linear.start(combination)
+        if start is not None:
+            by_forms.setdefault(tuple(v for v, _ in combination), []).append(start)
+    promising: list[tuple[tuple[Variant, ...], _Start]] = []
+    for forms, own in by_forms.items():
         own.sort(key=lambda start: start.left)
-        promising += [(variant, start) for start in own[:starts]]
+        promising += [(forms, start) for start in own[:starts]]
     promising.sort(key=lambda one: one[1].left)
     fits: list[Fit] = []
-    followed: set[Variant] = set()
-    for variant, start in promising:
+    followed: set[tuple[Variant, ...]] = set()
+    for forms, start in promising:
         # To first order is not the last word: one start of each form is fitted, unless it is far
         # off, and whatever is within a factor of the best.
-        limit = CRITERIA.second_start if variant in followed else CRITERIA.far_off
+        limit = CRITERIA.second_start if forms in followed else CRITERIA.far_off
         if start.left > limit * promising[0][1].left:
             continue
-        followed.add(variant)
-        model = (*base.variants, variant)
+        followed.add(forms)
         try:
-            at = _damped(experiment, base, variant, start, robust)
+            at = _damped(experiment, base, forms, start, variances, robust)
             found = fit(
-                experiment, model, at, base.used, evaluations=CRITERIA.first_look, robust=robust
+                experiment,
+                forms,
+                at,
+                base.used,
+                variances,
+                evaluations=CRITERIA.first_look,
+                robust=robust,
             )
         except SolveError:
             continue
@@ -88,7 +98,8 @@ def fit_from_grid(
     sizes = [f.size(robust) for f in fits]
     for k, found in enumerate(fits):
         if sizes[k] <= CRITERIA.worthwhile * min(*sizes, known):
-            found = _again(experiment, found, found.values, evaluations, robust)
+            if not found.converged:
+                found = _again(experiment, found, found.values, evaluations, robust)
             fits[k] = _around_jumps(experiment, found, evaluations, robust)
     return fits
 
@@ -102,61 +113,163 @@ class _Start:
     left: float
 
 
-def _to_first_order(
-    experiment: Experiment,
-    base: Fit,
-    variants: Sequence[Variant],
-    one: Signature,
+class ToFirstOrder:
+    """Least squares to first order about the baseline, specimens' deviations among the unknowns.
+
+    Args:
+        experiment: the test.
+        base: the fitted model, about which it is linear.
+        variances: what readings and specimens scatter by.
+        robust: see fit.
+    """
+
+    def __init__(
+        self, experiment: Experiment, base: Fit, variances: Variances, robust: float | None
+    ) -> None:
+        self._experiment, self._base, self._robust = experiment, base, robust
+        rows = base.used
+        self._whiten = variances.noise.whitener(base.readings, rows)
+        at = linearised(experiment, base)
+        specimens = [
+            variances.scatter[group] * block
+            for group, block in at.specimens.items()
+            if variances.scatter.get(group, 0.0) > 0.0
+        ]
+        self._random = self._whiten(
+            np.concatenate(specimens, axis=1) if specimens else np.zeros((int(rows.sum()), 0))
+        )
+        # With specimens that are alike.
+        self._observed = at.residual
+
+    def whitened(self, errors: Array) -> Array:
+        """Of all readings, (n,), those that are fitted, white."""
+        return self._whiten(errors[self._base.used])
+
+    def columns(self, one: Signature, names: Sequence[str]) -> Array:
+        """White derivatives in some parameters, (n, n_names)."""
+        rows = self._base.used
+        own = [one.slopes[name][rows] for name in names]
+        return self._whiten(np.column_stack(own)) if own else np.zeros((int(rows.sum()), 0))
+
+    def of_fit(self, model: Fit, names: Sequence[str]) -> Array:
+        """White derivatives of a fitted model in some of its parameters, (n, n_names)."""
+        place = {name: k for k, name in enumerate(model.values)}
+        return self._whiten(model.slopes[:, [place[name] for name in names]][model.used])
+
+    @property
+    def residual(self) -> Array:
+        """White residual of the baseline, (n,)."""
+        return self._whiten(self._observed)
+
+    @property
+    def random(self) -> Array:
+        """White columns of the specimens' deviations, each of variance one, (n, q)."""
+        return self._random
+
+    def start(self, combination: Combination) -> _Start | None:
+        """The step that least squares would take within bounds, and the sum of squares after it.
+
+        None where something is not a number.
+        """
+        variants = tuple(v for v, _ in combination)
+        at = dict(self._base.values)
+        slopes: dict[str, Array] = {}
+        moved = np.zeros(len(self._base.residual))
+        for _, one in combination:
+            at |= {n: v for n, v in one.at.items() if n not in self._base.values}
+            slopes |= one.slopes
+            moved += one.expected - one.base
+        r = self._whiten(self._observed - moved[self._base.used])
+        rows = self._base.used
+        J = self._whiten(np.column_stack([slope[rows] for slope in slopes.values()]))
+        return bounded_step(
+            J,
+            r,
+            at,
+            list(slopes),
+            parameters_of(self._experiment, variants),
+            random=self._random,
+            robust=self._robust,
+        )
+
+
+def bounded_step(
+    J: Array,
+    r: Array,
+    at: dict[str, float],
+    names: Sequence[str],
+    parameters: Sequence[Parameter],
+    *,
+    random: Array,
     robust: float | None,
 ) -> _Start | None:
-    """The step that least squares would take within bounds, and the sum of squares after it."""
-    rows = base.used
-    r = (experiment.readings.observed - one.expected)[rows] * base.weight[rows]
-    J = weighted(one.slopes, one.slopes, rows, base.weight)
+    """The step of linear least squares within bounds; None where something is not a number.
+
+    Args:
+        J: white derivatives, (n, n_names).
+        r: white residual, (n,).
+        at: values of all parameters.
+        names: of those that are moved.
+        parameters: all of the model's, with their bounds.
+        random: columns of unknowns of variance one about nothing, (n, q).
+        robust: see fit.
+    """
     if not (np.isfinite(J).all() and np.isfinite(r).all()):
         return None
     scale = np.linalg.norm(J, axis=0)
     scale[scale == 0.0] = 1.0
-    step = np.linalg.lstsq(J / scale, r, rcond=1e-10)[0]
-    bounds = {p.name: p for p in parameters_of(experiment, variants)}
-    lower = np.array([bounds[n].lower - one.at[n] for n in one.slopes]) * scale
-    upper = np.array([bounds[n].upper - one.at[n] for n in one.slopes]) * scale
-    if not ((lower <= step) & (step <= upper)).all():
-        step = lsq_linear(J / scale, r, (lower, upper), method="bvls").x
-    step /= scale
-    by_name = dict(zip(one.slopes, step.tolist(), strict=True))
-    return _Start(one.at, by_name, soft_size(r - J @ step, robust))
+    q, p = random.shape[1], len(names)
+    A = np.block([[J / scale, random], [np.zeros((q, p)), np.eye(q)]])
+    y = np.concatenate([r, np.zeros(q)])
+    step = np.linalg.lstsq(A, y, rcond=1e-10)[0]
+    bounds = {one.name: one for one in parameters}
+    free = np.full(q, np.inf)
+    lower = np.array([bounds[n].lower - at[n] for n in names]) * scale
+    upper = np.array([bounds[n].upper - at[n] for n in names]) * scale
+    if not ((lower <= step[:p]) & (step[:p] <= upper)).all():
+        # A fixed parameter would leave no room between its bounds.
+        upper = np.maximum(upper, lower + 1e-12)
+        bound = (np.concatenate([lower, -free]), np.concatenate([upper, free]))
+        step = lsq_linear(A, y, bound, method="bvls").x
+    by_name = dict(zip(names, (step[:p] / scale).tolist(), strict=True))
+    return _Start(at, by_name, soft_size(y - A @ step, robust))
 
 
 def _damped(
-    experiment: Experiment, base: Fit, variant: Variant, start: _Start, robust: float | None
+    experiment: Experiment,
+    base: Fit,
+    variants: tuple[Variant, ...],
+    start: _Start,
+    variances: Variances,
+    robust: float | None,
 ) -> dict[str, float]:
     """Values along the step where the model is best: to first order it may lead too far.
 
     Raises:
         SolveError: the model has no solution at any of them.
     """
-    bounds = {p.name: p for p in parameters_of(experiment, (*base.variants, variant))}
+    bounds = {p.name: p for p in parameters_of(experiment, variants)}
+    whiten = variances.noise.whitener(base.readings, base.used)
     best, left = None, float("inf")
     for share in DAMPED:
         at = {
             name: float(np.clip(value + share * start.step.get(name, 0.0), p.lower, p.upper))
             for (name, value), p in ((item, bounds[item[0]]) for item in start.at.items())
         }
-        for p in variant.amplitudes:
+        for p in (p for v in variants for p in v.amplitudes):
             at[p.name] = max(at[p.name], _least(p, at[p.name]))
         try:
-            expected, _ = experiment.predict((*base.variants, variant), at)
+            expected, _ = experiment.predict(variants, at)
         except SolveError:
             continue
-        r = ((experiment.readings.observed - expected) * base.weight)[base.used]
-        size = soft_size(r, robust)
+        size = soft_size(whiten((experiment.readings.observed - expected)[base.used]), robust)
         if size < left:
             best, left = at, size
         if share == 1.0 and size < 2.0 * start.left:
             break
     if best is None:
-        raise SolveError(f"no solution near the starts of {variant.label}")
+        labels = ", ".join(v.label for v in variants)
+        raise SolveError(f"no solution near the starts of {labels}")
     return best
 
 
@@ -174,6 +287,8 @@ def _again(
             found.variants,
             start,
             found.used,
+            found.variances,
+            deviations=found.deviations,
             evaluations=evaluations,
             robust=robust,
         )
@@ -189,9 +304,10 @@ def _around_jumps(
     The sum of squares has a step wherever a reading comes to lie on the other side of such a
     jump; least squares stays between two of them.
     """
-    names = [p.name for p in found.variants[-1].parameters if p.jumps]
-    for name in names:
+    parameters = parameters_of(experiment, found.variants)
+    for name in [p.name for v in found.variants for p in v.parameters if p.jumps]:
         for shares in AROUND:
+            linear = ToFirstOrder(experiment, found, found.variances, robust)
             starts = []
             for value in found.values[name] * shares:
                 at = found.values | {name: float(value)}
@@ -200,8 +316,17 @@ def _around_jumps(
                 except SolveError:
                     continue
                 rest = {n: slopes[n] for n in found.values if n != name}
-                own = Signature(at, expected, rest)
-                start = _to_first_order(experiment, found, found.variants, own, robust)
+                one = Signature(at, expected, expected, rest)
+                r = linear.whitened(experiment.readings.observed - expected)
+                start = bounded_step(
+                    linear.columns(one, list(rest)),
+                    r,
+                    at,
+                    list(rest),
+                    parameters,
+                    random=linear.random,
+                    robust=robust,
+                )
                 if start is not None:
                     starts.append(start)
             if not starts:
@@ -214,45 +339,54 @@ def _around_jumps(
     return found
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Signature:
     """The model with a little of an effect.
 
     Attributes:
         at: values of all parameters.
         expected: readings there, (n,).
-        slopes: their derivatives, (n,) each, by parameter of the fitted model and by amplitude of
-            the effect.
+        base: readings of the model without the effect, (n,).
+        slopes: derivatives of ``expected``, (n,) each, by parameter of the fitted model and by
+            amplitude of the effect.
     """
 
     at: dict[str, float]
     expected: Array
+    base: Array
     slopes: dict[str, Array]
+
+    def little(self, variant: Variant) -> bool:
+        """Whether there is next to nothing of the effect."""
+        return all(abs(self.at[p.name]) <= SMALL for p in variant.amplitudes)
 
 
 def signatures(
-    experiment: Experiment, base: Fit, variant: Variant, *, amplitudes: bool
+    experiment: Experiment, base: Fit, alike: Array, variant: Variant
 ) -> list[Signature]:
-    """The model's sensitivities to an effect, for each shape of it.
+    """The model's sensitivities to an effect, for each shape of it and each start of an amplitude.
 
     Args:
         experiment: the test.
-        base: the model so far.
+        base: the fitted baseline.
+        alike: its expected readings with specimens that are alike, (n,).
         variant: the effect's form.
-        amplitudes: also at the starts of its amplitudes, where it has any; else all but at zero.
 
     Returns:
         One for each of them where the model has a solution.
     """
     found = []
     names = [*base.values, *(p.name for p in variant.amplitudes)]
-    for shape in variant.grid(amplitudes=amplitudes):
-        at = base.values | {p.name: SMALL for p in variant.amplitudes} | shape
+    nothing = {p.name: SMALL for p in variant.amplitudes}
+    shapes = [nothing | shape for shape in variant.grid(amplitudes=False)]
+    shapes += [nothing | shape for shape in variant.grid(amplitudes=True)]
+    for shape in dict.fromkeys(tuple(shape.items()) for shape in shapes):
+        at = base.values | dict(shape)
         try:
             expected, slopes = experiment.predict((*base.variants, variant), at)
         except SolveError:
             continue
-        found.append(Signature(at, expected, {name: slopes[name] for name in names}))
+        found.append(Signature(at, expected, alike, {name: slopes[name] for name in names}))
     return found
 
 

@@ -55,7 +55,7 @@ def read_folder(folder: Path, kinds: Sequence[Kind]) -> Measurement:
                     f"{folder / entry.file}: {column}: {columns[column][i]:g} in reading {i + 1}, "
                     f"allowed is {allowed}"
                 )
-        runs.append(Run(entry.file, entry.role == "holdout", entry.label, columns))
+        runs.append(Run(entry.file, entry.role == "holdout", entry.label, columns, entry.specimen))
     noise = getattr(keys.noise, kind.quantity)
     return Measurement(folder, kind.name, keys.title, keys.fabric, keys.rig, noise, tuple(runs))
 

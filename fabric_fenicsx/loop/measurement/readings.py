@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ..inference.experiment import Readings
 from .schema import Measurement
 
-__all__ = ["common_noise", "readings_of"]
+__all__ = ["common_noise", "readings_of", "specimens_of"]
 
 Array = npt.NDArray[np.float64]
 
@@ -31,10 +31,14 @@ def readings_of(
         more: further attributes of Readings; by default all are usable and weigh the same.
     """
     runs = [run for m in measurements for run in m.runs]
+    folders = [number for number, m in enumerate(measurements) for _ in m.runs]
+    specimens = specimens_of(measurements)
+    first = [specimens.index(number) for number in range(max(specimens) + 1)]
     counts = [run.count for run in runs]
     given: dict[str, Any] = {
         "usable": np.ones(len(observed), dtype=bool),
         "weight": np.ones(len(observed)),
+        "chain": np.repeat(np.arange(len(runs)), counts),
     }
     return Readings(
         observed=observed,
@@ -42,8 +46,23 @@ def readings_of(
         holdout=np.repeat([run.holdout for run in runs], counts),
         names=tuple(run.label or run.file for run in runs),
         covariates=covariates,
+        specimen=np.repeat(specimens, counts),
+        specimens=tuple(runs[k].specimen or runs[k].label or runs[k].file for k in first),
+        folder=np.repeat(folders, counts),
         **(given | more),
     )
+
+
+def specimens_of(measurements: Sequence[Measurement]) -> list[int]:
+    """Number of the specimen of every run, counted from 0 in the order of the runs."""
+    # A name means the same specimen in one folder, not in two.
+    keys = [
+        (folder, run.specimen, 0 if run.specimen else number)
+        for folder, m in enumerate(measurements)
+        for number, run in enumerate(m.runs)
+    ]
+    different = list(dict.fromkeys(keys))
+    return [different.index(key) for key in keys]
 
 
 def common_noise(measurements: Sequence[Measurement]) -> float | None:

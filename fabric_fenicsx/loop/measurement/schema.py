@@ -65,6 +65,9 @@ class RunKeys(Keys):
         description="holdout: used for nothing but to report an error"
     )
     label: str = Field("", description="free text")
+    specimen: str = Field(
+        "", description="of which it was measured; a run without one is a specimen of its own"
+    )
 
 
 class MeasurementKeys(Keys):
@@ -84,6 +87,7 @@ class Run:
         file: its name.
         holdout: whether it may only be used to report an error.
         label: free text.
+        specimen: name of the specimen; empty where the run is a specimen of its own.
         columns: readings by column, each (n,); an empty optional entry is NaN.
     """
 
@@ -91,6 +95,7 @@ class Run:
     holdout: bool
     label: str
     columns: dict[str, Array]
+    specimen: str = ""
 
     @property
     def count(self) -> int:

@@ -6,7 +6,7 @@ by, what was left out, what cannot be told apart, what to measure next) is for t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -19,7 +19,7 @@ from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Effect, Parameter, Variant
 from ..inference.fitting import Fit, parameters_of
 from ..kinds import kind_of
-from ..measurement.schema import Measurement
+from ..measurement.schema import Measurement, Run
 
 __all__ = ["SCHEMA", "combined_report", "headline", "parameter_unit", "test_report"]
 
@@ -83,6 +83,10 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
             "noise": noise,
         },
         "noise_source": d.noise_source,
+        "noise_model": noise_model(d),
+        "scatter": scatter(d.final),
+        "holdout_expected": d.holdout_expected,
+        "curve": None if d.curve is None else _curve(d),
         "holdout_source": d.holdout_source,
         "model": _numbers(d, d.final, d.holdout_after),
         "best": None if d.best is None else _numbers(d, d.best, d.holdout_best),
@@ -106,16 +110,92 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
                         "label": run.label,
                         "role": "holdout" if run.holdout else "fit",
                         "readings": run.count,
+                        **_of_run(d, number),
                     }
-                    for run in m.runs
+                    for number, run in runs
                 ],
             }
-            for m in measurements
+            for m, runs in _numbered(measurements)
         ],
         "notes": list(d.notes),
     }
     numbers: dict[str, Any] = finite(content)
     return numbers | {"headline": headline(numbers)}
+
+
+def noise_model(d: Diagnosis) -> dict[str, Any]:
+    """What a reading scatters by, in numbers and in words."""
+    noise, unit = d.noise_model, parameter_unit(d.experiment.quantity)
+    words = []
+    if noise.correlation > CRITERIA.said_correlation:
+        words.append(f"correlated from one reading to the next by {noise.correlation:.2f} (AR(1))")
+    at_largest = noise.share * float(np.abs(d.experiment.readings.observed).max())
+    if at_largest > noise.floor:
+        words.append(f"growing by {100.0 * noise.share:.2g} % of the reading")
+    if d.quantum > CRITERIA.said_quantum * d.noise:
+        words.append(f"written in steps of {d.quantum:.3g} {unit}")
+    return {
+        "floor": noise.floor,
+        "share": noise.share,
+        "correlation": noise.correlation,
+        "quantum": d.quantum,
+        "words": ", ".join(words) or "independent readings of one sigma",
+    }
+
+
+def scatter(model: Fit) -> dict[str, dict[str, float]]:
+    """By parameter, or amplitudes together, one sigma of the specimens, with its standard error.
+
+    Of n specimens a standard deviation is known to 1/√(2 (n - 1)).
+    """
+    n = len(np.unique(model.readings.specimen[model.used]))
+    return {
+        group: {"share": tau, "std": tau / float(np.sqrt(2.0 * max(n - 1, 1)))}
+        for group, tau in model.variances.scatter.items()
+    }
+
+
+def _numbered(
+    measurements: Sequence[Measurement],
+) -> Iterator[tuple[Measurement, list[tuple[int, Run]]]]:
+    """Measurements with their runs and their numbers among all runs."""
+    number = 0
+    for m in measurements:
+        yield m, list(enumerate(m.runs, start=number))
+        number += len(m.runs)
+
+
+def _of_run(d: Diagnosis, number: int) -> dict[str, Any]:
+    """Specimen, parameters and errors of a run."""
+    readings = d.experiment.readings
+    own = readings.run == number
+    rows = own & readings.usable & ~d.outliers
+    specimen = int(readings.specimen[own][0])
+    fitted = bool(rows.any() and not readings.holdout[own].any())
+    deviations = d.final.deviations
+    return {
+        "specimen": readings.specimens[specimen],
+        "parameters": {
+            p.name: d.final.values[p.name]
+            * (1.0 + (deviations[p.name][specimen] if p.name in deviations else 0.0))
+            for p in d.experiment.baseline
+        }
+        if fitted
+        else None,
+        "error": {"before": d.baseline.rms(rows), "after": d.final.rms(rows)},
+    }
+
+
+def _curve(d: Diagnosis) -> dict[str, Any]:
+    """What readings on one curve know, and which effects could have made it."""
+    assert d.curve is not None
+    return {
+        "x": d.curve.x,
+        "y": d.curve.y,
+        "file": f"{d.experiment.test}_curve.csv",
+        "effects": list(d.of_the_curve),
+        "largest_std": float(d.curve.std.max()),
+    }
 
 
 def combined_report(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -151,6 +231,14 @@ def headline(report: Mapping[str, Any]) -> str:
             if effect["rivals"]:
                 text += f" This data cannot tell {effect['name']} from {one_of(effect['rivals'])}."
         return text
+    if report["curve"] is not None:
+        text = (
+            "The readings go one way at one rate: they know the curve of the moment against the "
+            f"angle, which the baseline is not (error {value(error['before']['fit'])}; {scatter}), "
+            "and not what makes it."
+        )
+        names = report["curve"]["effects"]
+        return text + (f" It may be {one_of(names)}." if names else "")
     nor = "and no known effect explains it, nor does a pair of them"
     text = f"The residual is not noise, {nor}: held-out error {before}; {scatter}."
     fitted = error["before"]["fit"]
@@ -186,10 +274,7 @@ def _form(d: Diagnosis, model: Fit, effect: Effect, variant: Variant) -> dict[st
 
 def _std(d: Diagnosis, model: Fit) -> dict[str, float | None]:
     """Standard errors; None of a parameter on a bound, where there is none."""
-    return {
-        name: None if name in model.at_bound else value
-        for name, value in model.errors_at(d.noise).items()
-    }
+    return {name: None if name in model.at_bound else value for name, value in model.errors.items()}
 
 
 def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:

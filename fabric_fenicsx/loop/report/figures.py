@@ -158,7 +158,7 @@ def residual_figure(diagnosis: Diagnosis) -> Figure:
                     continue
                 axes.scatter(
                     along[flags],
-                    (fit.residual * fit.weight)[flags],
+                    (fit.residual * readings.weight)[flags],
                     s=5,
                     color=colour,
                     linewidth=0,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pandas as pd
 
+from ..inference.curve import Curve
 from ..inference.diagnosis import Diagnosis
 from ..inference.fitting import Fit
 
-__all__ = ["law_table"]
+__all__ = ["curve_table", "law_table"]
 
 
 def law_table(diagnosis: Diagnosis, model: Fit) -> pd.DataFrame | None:
@@ -28,7 +29,12 @@ def law_table(diagnosis: Diagnosis, model: Fit) -> pd.DataFrame | None:
         {
             law.x: law.at,
             law.y: law.value,
-            f"std_{law.y}": model.error_of(law.slopes, diagnosis.noise),
+            f"std_{law.y}": model.error_of(law.slopes),
             f"baseline_{law.y}": before.value[-1] * law.at / before.at[-1],
         }
     )
+
+
+def curve_table(curve: Curve) -> pd.DataFrame:
+    """What readings know that are on one curve, with its standard error (``std_...``)."""
+    return pd.DataFrame({curve.x: curve.at, curve.y: curve.value, f"std_{curve.y}": curve.std})

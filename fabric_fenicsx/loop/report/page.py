@@ -20,7 +20,7 @@ from ...output.page import inline, number, rendered, save_figure
 from ..inference.diagnosis import Diagnosis
 from .content import parameter_unit
 from .figures import candidates_figure, data_figure, law_figure, residual_figure, shown_model
-from .law_table import law_table
+from .law_table import curve_table, law_table
 
 __all__ = ["write_report"]
 
@@ -58,6 +58,8 @@ def _write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]
             save_figure(figure, folder / f"{report['test']}_{name}.png")
         if law is not None:
             law.to_csv(folder / f"{report['test']}_law.csv", index=False)
+        if diagnosis.curve is not None:
+            curve_table(diagnosis.curve).to_csv(folder / report["curve"]["file"], index=False)
         sections.append(
             {
                 "report": report,

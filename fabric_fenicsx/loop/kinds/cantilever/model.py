@@ -24,11 +24,11 @@ from scipy.interpolate import CubicSpline
 from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Parameter, Variant, scaled
-from ...inference.experiment import Law
-from ...measurement.readings import common_noise, readings_of
+from ...inference.experiment import NO_DEVIATIONS, Deviations, Law
+from ...measurement.readings import common_noise, readings_of, specimens_of
 from ...measurement.schema import Measurement
 from .effects import CANTILEVER_EFFECTS
-from .hanging import HangingTow, Laws
+from .hanging import HangingTow, Laws, Shape
 from .variant import StripVariant
 
 __all__ = ["Cantilever"]
@@ -59,11 +59,13 @@ class _Specimen:
 
     Attributes:
         tow: its model.
+        specimen: its number.
         rows: places of the readings, (n,).
         s, x, z: of the readings [mm], (n,); s is NaN where it is not known.
     """
 
     tow: HangingTow
+    specimen: int
     rows: npt.NDArray[np.int64]
     s: Array
     x: Array
@@ -88,6 +90,7 @@ class Cantilever:
     test = "cantilever"
     quantity = "z_mm"
     notes = ()
+    one_curve = None
 
     def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
         self.noise = common_noise(measurements)
@@ -114,7 +117,12 @@ class Cantilever:
             "slope [°]": np.degrees(slope),
         }
         weight = 1.0 / np.sqrt(1.0 + (self.scatter * self._steepness) ** 2)
-        self.readings = readings_of(measurements, self._observed, covariates, weight=weight)
+        # A strip is a line of readings; the next length begins another.
+        ends = (np.diff(self._run) != 0) | (np.diff(self._length) != 0.0)
+        chain = np.concatenate([[0], np.cumsum(ends)])
+        self.readings = readings_of(
+            measurements, self._observed, covariates, weight=weight, chain=chain
+        )
         shares = {"curvature": curvature, "moment": moment}
         self.effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
 
@@ -123,7 +131,8 @@ class Cantilever:
         tows: dict[tuple[float, ...], HangingTow] = {}
         table: list[Array] = []
         run_of: list[npt.NDArray[np.int64]] = []
-        keys: list[tuple[float, ...]] = []
+        keys: list[tuple[int, tuple[float, ...]]] = []
+        specimens = specimens_of(measurements)
         number = 0
         for m in measurements:
             tow, spacing = m.fabric.tow, m.fabric.tow_spacing_mm
@@ -136,19 +145,21 @@ class Cantilever:
                 columns = [c[n][order] for n in ("length_mm", "s_mm", "x_mm", "z_mm")]
                 table.append(np.stack(columns))
                 run_of.append(np.full(run.count, number, dtype=np.int64))
-                number += 1
                 for length in columns[0]:
                     key = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
-                    keys.append(key)
+                    keys.append((specimens[number], key))
                     if key not in tows:
                         tows[key] = HangingTow(*key)
+                number += 1
         self._length, self._arc, x, self._observed = np.concatenate(table, axis=1)
         self._run = np.concatenate(run_of)
         self._specimens = []
-        for own, tow_model in tows.items():
+        for own in dict.fromkeys(keys):
             rows = np.array([i for i, other in enumerate(keys) if other == own])
             self._specimens.append(
-                _Specimen(tow_model, rows, self._arc[rows], x[rows], self._observed[rows])
+                _Specimen(
+                    tows[own[1]], own[0], rows, self._arc[rows], x[rows], self._observed[rows]
+                )
             )
 
     # Start --------------------------------------------------------------------------------
@@ -215,20 +226,27 @@ class Cantilever:
     # Prediction ---------------------------------------------------------------------------
 
     def predict(
-        self, variants: Sequence[Variant], values: Mapping[str, float]
+        self,
+        variants: Sequence[Variant],
+        values: Mapping[str, float],
+        deviations: Deviations = NO_DEVIATIONS,
     ) -> tuple[Array, dict[str, Array]]:
         """Heights [mm] and their derivatives; see Experiment."""
-        mine = [v for v in variants if isinstance(v, StripVariant)]
-        laws = self._laws(mine)
-        names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
+        strips = [v for v in variants if isinstance(v, StripVariant)]
+        laws = self._laws(strips)
+        names = [p.name for p in (*self.baseline, *(p for v in strips for p in v.parameters))]
         expected = np.zeros(len(self._run))
         slopes = {name: np.zeros(len(self._run)) for name in names}
+        shapes: dict[tuple[float, ...], Shape] = {}
         for own in self._specimens:
-            shape = own.tow.solve(values, laws)
+            factors = {name: 1.0 + float(d[own.specimen]) for name, d in deviations.items()}
+            mine = {name: value * factors.get(name, 1.0) for name, value in values.items()}
+            key = (id(own.tow), *mine.values())
+            shape = shapes[key] = shapes.get(key) or own.tow.solve(mine, laws)
             heights, changes = self._heights(own, shape.x, shape.z, shape.slopes)
             expected[own.rows] = heights
             for name, change in changes.items():
-                slopes[name][own.rows] = change
+                slopes[name][own.rows] = change * factors.get(name, 1.0)
         return expected, slopes
 
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law:

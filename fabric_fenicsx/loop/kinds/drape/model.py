@@ -31,7 +31,7 @@ from ....errors import SolveError
 from ....rigs.drape import DrapeCase
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Parameter, Variant
-from ...inference.experiment import Readings
+from ...inference.experiment import NO_DEVIATIONS, Deviations, Readings
 from ...inference.noise import estimated_noise
 from ...measurement.readings import readings_of
 from ...measurement.schema import Measurement
@@ -74,6 +74,7 @@ class Drape:
     test = "drape"
     quantity = "angle_deg"
     baseline: tuple[Parameter, ...] = ()
+    one_curve = None
 
     def __init__(
         self,
@@ -186,7 +187,10 @@ class Drape:
             "y [mm]": y,
         }
         row = np.concatenate(self._order)
-        readings = readings_of(self.measurements, angle, covariates, row=row)
+        # All over the sheet: no reading is the next of another.
+        readings = readings_of(
+            self.measurements, angle, covariates, row=row, chain=np.arange(len(angle))
+        )
         sigma = self.sigma
         noise = self.noise
         if noise is None:
@@ -251,9 +255,27 @@ class Drape:
         """None: angles on a sheet are on no curve; see Experiment."""
 
     def predict(
+        self,
+        variants: Sequence[Variant],
+        values: Mapping[str, float],
+        deviations: Deviations = NO_DEVIATIONS,
+    ) -> tuple[Array, dict[str, Array]]:
+        """Angles [degrees] and their derivatives; see Experiment.
+
+        Amplitudes that deviate from sheet to sheet are taken to first order.
+        """
+        expected, slopes = self._common(variants, values)
+        specimen = self.readings.specimen if deviations else None
+        for name, deviation in deviations.items():
+            own = deviation[specimen]
+            expected = expected + slopes[name] * values[name] * own
+            slopes[name] = slopes[name] * (1.0 + own)
+        return expected, slopes
+
+    def _common(
         self, variants: Sequence[Variant], values: Mapping[str, float]
     ) -> tuple[Array, dict[str, Array]]:
-        """Angles [degrees] and their derivatives; see Experiment."""
+        """The same with sheets that are alike."""
         # Offset before rotation, whichever was found first: marks keep to the tools' axes.
         place = {v: k for k, v in enumerate(v for e in self.effects for v in e.variants)}
         mine = [v for v in variants if isinstance(v, DrapeVariant)]

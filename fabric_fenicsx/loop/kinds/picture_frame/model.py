@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import nnls
 from ufl import acos, sin
 
 from ....inputs.parameters import Parameter
@@ -28,6 +29,7 @@ from ....mechanics.laws.springs import PolynomialSpring
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Variant, scaled
+from ...inference.experiment import NO_DEVIATIONS, Deviations, OneCurve
 from ...inference.noise import estimated_noise
 from ...measurement.readings import common_noise, readings_of
 from ...measurement.schema import Measurement
@@ -40,10 +42,14 @@ __all__ = ["PictureFrame"]
 Array = npt.NDArray[np.float64]
 
 BASELINE = (
-    Parameter("k1_N", (0.0,), meaning="spring, moment per area and angle"),
-    Parameter("k3_N", (0.0,), meaning="spring, moment per area and angle³"),
-    Parameter("c1_N_s", (0.0,), meaning="dashpot, moment per area and rate"),
+    Parameter("k1_N", (0.0,), 0.0, meaning="spring, moment per area and angle"),
+    Parameter("k3_N", (0.0,), 0.0, meaning="spring, moment per area and angle³"),
+    Parameter("c1_N_s", (0.0,), 0.0, meaning="dashpot, moment per area and rate"),
 )
+
+
+#: Share by which speeds may differ that are one.
+SAME_RATE = 0.1
 
 
 class PictureFrame:
@@ -56,11 +62,11 @@ class PictureFrame:
 
     test = "picture_frame"
     quantity = "force_N"
-    baseline = BASELINE
     notes = ()
 
     def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
         self.noise = common_noise(measurements)
+        self.baseline: tuple[Parameter, ...] = BASELINE
         runs = [(m, run) for m in measurements for run in m.runs]
         motions = [
             frame_motion(
@@ -91,6 +97,7 @@ class PictureFrame:
         self._leave_out_uncertain(
             rate_error * self._at_readings(kinematics["rate_per_speed"].value)
         )
+        self._start()
         shares = {
             "duration": max(float(p.time[-1] - p.time[0]) for p in motions),
             "angle": float(np.abs(gamma).max()),
@@ -98,6 +105,18 @@ class PictureFrame:
             "travel": float(np.abs(self._points["D"].value).max()),
         }
         self.effects = [self._with_runs(scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
+
+    def _start(self) -> None:
+        """Begin fits of the baseline with its least squares, which are linear."""
+        rows = self.readings.fit
+        _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
+        J = np.column_stack([slopes[p.name][rows] for p in self.baseline])
+        scale = np.linalg.norm(J, axis=0)
+        scale[scale == 0.0] = 1.0
+        k = nnls(J / scale, self.readings.observed[rows])[0] / scale
+        self.baseline = tuple(
+            replace(p, starts=(float(value),)) for p, value in zip(self.baseline, k, strict=True)
+        )
 
     def _leave_out_uncertain(self, rate_error: Array) -> None:
         """Leave out readings whose rate is so uncertain [rad/s] that the dashpot's force is.
@@ -145,13 +164,50 @@ class PictureFrame:
     def _at_readings(self, values: Array) -> Array:
         return np.broadcast_to(values, self._points["D"].value.shape)[self._place]
 
+    @property
+    def one_curve(self) -> OneCurve | None:
+        """The moment against the angle, where all runs that are fitted go one way at one rate.
+
+        At one speed of the crosshead or of the angle: the rate is then a function of the angle.
+        """
+        rows = self.readings.fit
+        known = self._kinematics(self._travel(None, {}), {})
+        rate = self._at_readings(known["rate"].value)[rows]
+        speed = self._at_readings(self._points["D_rate"].value)[rows]
+        steady = any(
+            np.ptp(v) <= SAME_RATE * float(np.abs(v).max(initial=0.0)) for v in (speed, rate)
+        )
+        if not steady or len(rate) == 0:
+            return None
+        every = self._at_readings(known["gamma"].value), self._at_readings(known["factor"].value)
+        return OneCurve("shear_angle_rad", "moment_N", *every)
+
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """None: the moment depends on the angle, its rate and its past; see Experiment."""
 
     def predict(
+        self,
+        variants: Sequence[Variant],
+        values: Mapping[str, float],
+        deviations: Deviations = NO_DEVIATIONS,
+    ) -> tuple[Array, dict[str, Array]]:
+        """Crosshead forces [N] and their derivatives; see Experiment.
+
+        Forces are linear in the baseline's parameters and in most amplitudes: what specimens
+        deviate by is taken to first order.
+        """
+        force, slopes = self._common(variants, values)
+        specimen = self.readings.specimen if deviations else None
+        for name, deviation in deviations.items():
+            own = deviation[specimen]
+            force = force + slopes[name] * values[name] * own
+            slopes[name] = slopes[name] * (1.0 + own)
+        return force, slopes
+
+    def _common(
         self, variants: Sequence[Variant], values: Mapping[str, float]
     ) -> tuple[Array, dict[str, Array]]:
-        """Crosshead forces [N] and their derivatives; see Experiment."""
+        """The same with specimens that are alike."""
         mine = [v for v in variants if isinstance(v, FrameVariant)]
         travels = [v for v in mine if v.travel is not None]
         travel = self._travel(travels[0] if travels else None, values)

@@ -1,0 +1,215 @@
+"""Effects judged to first order, alone and together, before any of them is fitted.
+
+With C the white derivatives of the readings in the amplitudes of some effects, for one shape each,
+and P what the baseline's own parameters and the specimens' deviations can make,
+
+    gain = r_⊥ᵀ C_⊥ (C_⊥ᵀ C_⊥)⁻¹ C_⊥ᵀ r_⊥,    r_⊥ = (I − P) r,  C_⊥ = (I − P) C
+
+is what they take off the sum of squares. Of one effect it is the score (Lagrange multiplier) test,
+χ² if r is noise (Rao, Proc. Camb. Phil. Soc. 44, 1948). All come from one Gram matrix, so that
+every pair, and every triple that a good pair is part of, can be looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import chi2
+
+from .effects import Effect, Variant
+from .fitting import Fit, orthogonal_to
+from .starts import Combination, Signature, ToFirstOrder
+
+__all__ = ["Screen", "Signatures"]
+
+Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.int64]
+Signatures = Mapping[Effect, Mapping[Variant, Sequence[Signature]]]
+
+#: Share of a column that must be left for it to have a signature of its own: round-off.
+LEFT = 1e-7
+#: Pairs that triples are looked for from, and pairs of one kind that are kept.
+BEST_PAIRS, FORMS = 12, 3
+#: Times that amplitudes of the wrong sign are taken out.
+SIGNS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """One shape of one form of an effect: its columns and what it costs."""
+
+    effect: Effect
+    variant: Variant
+    signature: Signature
+    places: tuple[int, ...]
+    parameters: int
+
+
+class Screen:
+    """All shapes of all effects, to first order.
+
+    Args:
+        base: the fitted baseline.
+        linear: it and what specimens scatter by, to first order.
+        signatures: of each form of each effect.
+    """
+
+    def __init__(self, base: Fit, linear: ToFirstOrder, signatures: Signatures) -> None:
+        self._count = int(base.used.sum())
+        random = linear.random
+        q = random.shape[1]
+        free = [name for name in base.values if name not in base.at_bound]
+        rest = np.concatenate([linear.of_fit(base, free), random], axis=1)
+        rest = np.concatenate([rest, np.eye(rest.shape[1])[rest.shape[1] - q :]])
+        padding = np.zeros(q)
+        columns: list[Array] = []
+        positive: list[bool] = []
+        self._groups: list[_Group] = []
+        for effect, forms in signatures.items():
+            for variant, shapes in forms.items():
+                for one in shapes:
+                    own, signs = _columns(linear, variant, one)
+                    if not np.isfinite(own).all():
+                        continue
+                    places = tuple(range(len(columns), len(columns) + own.shape[1]))
+                    columns += [np.concatenate([c, padding]) for c in own.T]
+                    positive += signs
+                    cost = len(variant.parameters)
+                    self._groups.append(_Group(effect, variant, one, places, cost))
+        if not columns:
+            columns = [np.zeros(self._count + q)]
+            positive = [True]
+        C = np.column_stack(columns)
+        left = orthogonal_to(rest, np.column_stack([C, np.concatenate([linear.residual, padding])]))
+        C_left, r = left[:, :-1], left[:, -1]
+        norm = np.linalg.norm(C_left, axis=0)
+        # What the baseline imitates to round-off has no signature of its own.
+        seen = norm > LEFT * np.maximum(np.linalg.norm(C, axis=0), 1e-300)
+        C_left = np.where(seen, C_left / np.where(seen, norm, 1.0), 0.0)
+        self._gram, self._by = C_left.T @ C_left, C_left.T @ r
+        self._positive = np.array(positive)
+        self._seen = seen
+
+    def scores(self, effects: Sequence[Effect]) -> list[tuple[float, float]]:
+        """For each effect the largest score of its forms, and the chance of such a score.
+
+        The chance is corrected for all signatures that were tried (Bonferroni).
+        """
+        little = [g for g in self._groups if g.signature.little(g.variant)]
+        gains = self._gains([(g,) for g in little])
+        found = []
+        for effect in effects:
+            score, chance = 0.0, 1.0
+            for group, gain in zip(little, gains, strict=True):
+                if group.effect is effect:
+                    score = max(score, float(gain))
+                    chance = min(chance, float(chi2.sf(gain, len(group.places))))
+            found.append((score, min(1.0, chance * len(little))))
+        return found
+
+    def best(self, count: int, effects: int) -> list[Combination]:
+        """The most promising combinations of several effects, each in up to three of its forms.
+
+        Args:
+            count: of sets of effects.
+            effects: in each, two or more.
+        """
+        sets = self._pairs()
+        for _ in range(effects - 2):
+            sets = self._with_another(self._ranked(sets, BEST_PAIRS))
+        chosen = self._ranked(sets, count)
+        return [tuple((g.variant, g.signature) for g in one) for one in chosen]
+
+    def instead(self, kept: Sequence[Variant], other: Effect) -> list[Combination]:
+        """The best combinations of some forms with an effect."""
+        sets: list[tuple[_Group, ...]] = [(g,) for g in self._groups if g.effect is other]
+        for variant in kept:
+            own = [g for g in self._groups if g.variant is variant]
+            sets = [(*one, g) for one in sets for g in own]
+        chosen = self._ranked([one for one in sets if _compatible(one)], 1)
+        return [tuple((g.variant, g.signature) for g in one) for one in chosen]
+
+    def _pairs(self) -> list[tuple[_Group, ...]]:
+        by_effect: dict[Effect, list[_Group]] = {}
+        for group in self._groups:
+            by_effect.setdefault(group.effect, []).append(group)
+        pairs = combinations(by_effect.values(), 2)
+        found = [both for a, b in pairs for both in product(a, b)]
+        return [both for both in found if _compatible(both)]
+
+    def _with_another(self, sets: Sequence[tuple[_Group, ...]]) -> list[tuple[_Group, ...]]:
+        found = [
+            (*one, group)
+            for one in sets
+            for group in self._groups
+            if all(group.effect is not other.effect for other in one)
+        ]
+        return [several for several in found if _compatible(several)]
+
+    def _ranked(self, sets: Sequence[tuple[_Group, ...]], count: int) -> list[tuple[_Group, ...]]:
+        """Of the best sets of effects the best combinations of forms, one shape each."""
+        gains = self._gains(sets)
+        cost = np.log(self._count) * np.array([sum(g.parameters for g in one) for one in sets])
+        order = np.argsort(cost - gains)
+        chosen: dict[frozenset[Effect], dict[frozenset[Variant], tuple[_Group, ...]]] = {}
+        for k in order:
+            one = sets[k]
+            effects = frozenset(g.effect for g in one)
+            if effects not in chosen and len(chosen) == count:
+                continue
+            forms = chosen.setdefault(effects, {})
+            variants = frozenset(g.variant for g in one)
+            if variants not in forms and len(forms) < FORMS:
+                forms[variants] = one
+        return [one for forms in chosen.values() for one in forms.values()]
+
+    def _gains(self, sets: Sequence[tuple[_Group, ...]]) -> Array:
+        """What each set takes off the sum of squares, amplitudes of the wrong sign left out."""
+        if not sets:
+            return np.zeros(0)
+        width = max(sum(len(g.places) for g in one) for one in sets)
+        places = np.full((len(sets), width), -1)
+        for k, one in enumerate(sets):
+            own = [place for g in one for place in g.places]
+            places[k, : len(own)] = own
+        return np.concatenate(
+            [self._solved(part) for part in np.array_split(places, 1 + len(places) // 20000)]
+        )
+
+    def _solved(self, places: Places) -> Array:
+        kept = (places >= 0) & self._seen[places]
+        by = np.where(kept, self._by[places], 0.0)
+        gram = self._gram[places[:, :, None], places[:, None, :]]
+        unit = np.eye(places.shape[1])
+        positive = self._positive[places]
+        for _ in range(SIGNS):
+            both = kept[:, :, None] & kept[:, None, :]
+            system = np.where(both, gram, 0.0) + unit * np.where(kept, 1e-9, 1.0)[:, None, :]
+            solution = np.linalg.solve(system, np.where(kept, by, 0.0)[:, :, None])[:, :, 0]
+            wrong = kept & positive & (solution < 0.0)
+            if not wrong.any():
+                break
+            kept = kept & ~wrong
+        return np.asarray(np.sum(np.where(kept, solution * by, 0.0), axis=1))
+
+
+def _columns(linear: ToFirstOrder, variant: Variant, one: Signature) -> tuple[Array, list[bool]]:
+    """White columns of a signature, (n, m), and which coefficients cannot be negative.
+
+    Of a little of an effect the derivatives in its amplitudes; where the model is not linear in
+    them, the whole change that a start of them makes.
+    """
+    if not one.little(variant):
+        return linear.whitened(one.expected - one.base)[:, None], [True]
+    names = [p.name for p in variant.amplitudes]
+    return linear.columns(one, names), [p.one_sided for p in variant.amplitudes]
+
+
+def _compatible(groups: Sequence[_Group]) -> bool:
+    """Whether no two forms share the name of a parameter."""
+    names = [p.name for g in groups for p in g.variant.parameters]
+    return len(set(names)) == len(names)

@@ -1,0 +1,105 @@
+"""What was left out, foretold from the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ...errors import SolveError
+from .criteria import CRITERIA
+from .effects import Variant
+from .experiment import Experiment, Readings
+from .fitting import Fit, fit
+
+__all__ = ["CrossValidation", "cross_validated", "has_own", "parts_by", "stretches"]
+
+Flags = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class CrossValidation:
+    """How well parts of the fitted readings are predicted from the others.
+
+    Attributes:
+        error: root mean square; NaN where no part could be predicted.
+        predictive: the same over sigma, less what predictions allow for; see Fit.predictive_rms.
+        parts: that were left out in turn.
+        failed: those of them that could not be predicted: too few readings are left, or the model
+            has no solution there.
+    """
+
+    error: float
+    predictive: float
+    parts: int
+    failed: int
+
+
+def stretches(readings: Readings, rows: Flags) -> list[Flags]:
+    """Fitted readings in parts, each of several stretches of every run.
+
+    The ends of a run belong to no part, so that nothing is carried on beyond them.
+    """
+    count = CRITERIA.blocks * CRITERIA.stretches
+    part = np.full(len(rows), -1)
+    for run in np.unique(readings.run[rows]):
+        own = np.flatnonzero(rows & (readings.run == run))
+        inner = own[1:-1]
+        if len(inner) >= CRITERIA.blocks:
+            part[inner] = (
+                np.arange(len(inner)) * min(count, len(inner)) // len(inner)
+            ) % CRITERIA.blocks
+    return [part == k for k in range(CRITERIA.blocks) if (part == k).any()]
+
+
+def parts_by(number: npt.NDArray[np.int64], rows: Flags) -> list[Flags]:
+    """Fitted readings in parts of one run, specimen or folder each, by its number, (n,)."""
+    return [rows & (number == k) for k in np.unique(number[rows])]
+
+
+def cross_validated(experiment: Experiment, model: Fit, parts: Sequence[Flags]) -> CrossValidation:
+    """Predict parts of what a model was fitted to, each from the others."""
+    total, allowed, count, failed = 0.0, 0.0, 0, 0
+    for part in parts:
+        rest = model.used & ~part
+        variants = _within(model.variants, model.readings.run[rest])
+        try:
+            if rest.sum() <= len(model.values) or not part.any():
+                raise SolveError("too few readings")
+            again = fit(
+                experiment,
+                variants,
+                model.values,
+                rest,
+                model.variances,
+                deviations=model.deviations,
+                evaluations=25,
+            )
+        except SolveError:
+            failed += 1
+            continue
+        size = int(part.sum())
+        total += size * again.rms(part) ** 2
+        allowed += size * again.predictive_rms(part) ** 2
+        count += size
+    if not count:
+        return CrossValidation(float("nan"), float("nan"), len(parts), failed)
+    error, predictive = float(np.sqrt(total / count)), float(np.sqrt(allowed / count))
+    return CrossValidation(error, predictive, len(parts), failed)
+
+
+def has_own(variants: Sequence[Variant]) -> bool:
+    """Whether some parameter of a model belongs to one run alone."""
+    return any(p.run is not None for v in variants for p in v.parameters)
+
+
+def _within(variants: Sequence[Variant], runs: npt.NDArray[np.int64]) -> tuple[Variant, ...]:
+    """The same without the parameters of other runs."""
+    return tuple(
+        replace(v, parameters=tuple(p for p in v.parameters if p.run is None or p.run in runs))
+        if has_own([v])
+        else v
+        for v in variants
+    )

@@ -1,0 +1,275 @@
+"""Variance components: what readings scatter by, and specimens, found together.
+
+Linear about a fit, with J the derivatives in the common parameters θ, D_g those in the deviations
+of the specimens of group g, and S a smooth line through each run that the model may have missed,
+
+    r = J Δθ + Σ_g D_g δ_g + S s + e,    δ_g ~ N(0, τ_g² I),  s ~ N(0, ω² σ² I),  e ~ N(0, Σ)
+
+so that the covariance of r is V = Σ + Σ_g τ_g² D_g D_gᵀ + ω² σ² S Sᵀ. Found are the parameters of Σ
+(see noise), τ and ω with the largest restricted likelihood (REML: Patterson & Thompson, Biometrika
+58, 1971), which allows for what θ has taken off, times priors that say what is usual. Models with
+other θ are compared by the likelihood itself, in which the specimens are integrated out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import BSpline
+from scipy.linalg import solve_triangular
+from scipy.optimize import minimize
+from scipy.stats import chi2
+
+from .criteria import CRITERIA
+from .experiment import Readings
+from .noise import Noise
+
+__all__ = ["Estimate", "Linearised", "Variances", "estimate"]
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+#: Units in which variances are looked for: (a tenth)² of a parameter, (2 %)² of a reading.
+SCATTER_UNIT, SHARE_UNIT = 0.01, 4e-4
+#: Step of a difference quotient.
+DIFFERENCE = 1e-5
+#: Products of columns that are kept, for different correlations and shares.
+KEPT = 20
+#: Largest correlation of neighbours; of a single run slower noise is not told from a misfit.
+MOST_CORRELATED, OF_ONE_RUN = 0.9, 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Variances:
+    """What readings and specimens scatter by.
+
+    Attributes:
+        noise: of a reading.
+        scatter: by group of parameters, one sigma of the specimens' deviations, as a share.
+    """
+
+    noise: Noise
+    scatter: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+
+@dataclass(frozen=True, slots=True)
+class Linearised:
+    """A fit and its surroundings, at the readings that are fitted.
+
+    Attributes:
+        residual: observed minus expected with no specimen's deviation, to first order, (n,).
+        common: derivatives in the common parameters that are on no bound, (n, p).
+        specimens: by group those in each specimen's deviation, (n, n_specimens).
+        readings: all of the test.
+        rows: those that are fitted, flags over all readings.
+    """
+
+    residual: Array
+    common: Array
+    specimens: Mapping[str, Array]
+    readings: Readings
+    rows: Flags
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Variance components, and how likely the readings are with them.
+
+    Attributes:
+        variances: the components.
+        smooth: ω of the module's docstring.
+        restricted: −2 log restricted likelihood, priors included.
+        likelihood: −2 log likelihood, priors included.
+        white: what is left, white, with the specimens' deviations but no smooth line, (n,).
+    """
+
+    variances: Variances
+    smooth: float
+    restricted: float
+    likelihood: float
+    white: Array
+
+
+def estimate(
+    at: Linearised,
+    start: Variances,
+    *,
+    given: float | None = None,
+    smooth: bool = False,
+    usual_scatter: float = CRITERIA.usual_scatter,
+) -> Estimate:
+    """Variance components with the largest restricted likelihood.
+
+    Args:
+        at: a fit.
+        start: where to begin.
+        given: one sigma of a reading as it was stated; it may be wrong, but not by much.
+        smooth: whether a smooth line through each run is allowed for, so that what a model misses
+            does not count as noise.
+        usual_scatter: of specimens, as a share: sigma of a half-normal prior of every τ.
+    """
+    problem = _Problem(at, given, smooth, usual_scatter)
+    groups = list(at.specimens)
+    scatter = [start.scatter.get(group, 0.1) for group in groups]
+    begin = [0.0, start.noise.correlation, start.noise.share**2 / SHARE_UNIT]
+    begin += [s**2 / SCATTER_UNIT for s in scatter] + [1.0] * smooth
+    problem.floor = start.noise.floor
+    correlated = problem.most_correlated
+    bounds: list[tuple[float, float]] = [(-4.0, 4.0), (0.0, correlated), (0.0, 100.0)]
+    bounds += [(0.0, 100.0)] * len(groups) + [(0.0, 1e6)] * smooth
+    x0 = np.clip(begin, [low for low, _ in bounds], [high for _, high in bounds])
+    found = minimize(
+        problem.with_slope,
+        x0,
+        method="L-BFGS-B",
+        jac=True,
+        bounds=bounds,
+        options={"maxiter": 60, "ftol": 1e-6},
+    )
+    restricted, likelihood = problem.cost(found.x)
+    noise, taus, omega = problem.split(found.x)
+    variances = Variances(noise, dict(zip(groups, taus.tolist(), strict=True)))
+    return Estimate(variances, omega, restricted, likelihood, problem.white(found.x))
+
+
+def chance_of_no_misfit(with_smooth: Estimate, without: Estimate) -> float:
+    """Chance of such a gain by a smooth line where there is none.
+
+    Half of the time ω is then on its bound (Self & Liang, J. Am. Stat. Assoc. 82, 1987).
+    """
+    gain = max(without.restricted - with_smooth.restricted, 0.0)
+    return float(0.5 * chi2.sf(gain, 1)) if gain > 0.0 else 1.0
+
+
+class _Problem:
+    """The likelihood as a function of the components."""
+
+    def __init__(
+        self, at: Linearised, given: float | None, smooth: bool, usual_scatter: float
+    ) -> None:
+        self._at, self._given, self._usual = at, given, usual_scatter
+        self.floor = 1.0
+        self._smooth = smooth
+        norms = np.linalg.norm(at.common, axis=0)
+        common = at.common / np.where(norms > 0.0, norms, 1.0)
+        # Parts that nothing depends on, and copies of others, have no likelihood.
+        q, r = np.linalg.qr(common)
+        own = np.abs(np.diag(r)) > 1e-9
+        self._common = q[:, own]
+        self._blocks = [np.asarray(block) for block in at.specimens.values()]
+        self._blocks = [block[:, np.any(block != 0.0, axis=0)] for block in self._blocks]
+        self._lines = _lines(at.readings, at.rows) if smooth else np.zeros((len(at.residual), 0))
+        self._known: dict[tuple[float, float], tuple[Array, float, float]] = {}
+        chain = at.readings.chain[at.rows]
+        several = len(np.unique(at.readings.run[at.rows])) > 1
+        self.most_correlated = MOST_CORRELATED if several else OF_ONE_RUN
+        if not (chain[1:] == chain[:-1]).any():
+            self.most_correlated = 0.0
+
+    def split(self, x: Array) -> tuple[Noise, Array, float]:
+        """Noise, τ by group, ω."""
+        noise = Noise(
+            float(self.floor * np.exp(x[0])),
+            float(np.sqrt(max(x[2], 0.0) * SHARE_UNIT)),
+            float(x[1]),
+        )
+        count = len(self._blocks)
+        taus = np.sqrt(np.maximum(x[3 : 3 + count], 0.0) * SCATTER_UNIT)
+        return noise, taus, float(np.sqrt(max(x[-1], 0.0))) if self._smooth else 0.0
+
+    def cost(self, x: Array) -> tuple[float, float]:
+        """−2 log restricted likelihood and −2 log likelihood."""
+        noise, taus, omega = self.split(x)
+        G, determinant, ratio = self._whitened(noise)
+        p = self._common.shape[1]
+        scale = np.concatenate([np.ones(p), self._scales(taus, omega * noise.floor)]) / noise.floor
+        q = len(scale) - p
+        M = G[:-1, :-1] * np.outer(scale, scale)
+        M[np.arange(p, p + q), np.arange(p, p + q)] += 1.0
+        M[np.arange(p), np.arange(p)] *= 1.0 + 1e-12
+        by = G[:-1, -1] * scale / noise.floor
+        factor = np.linalg.cholesky(M)
+        half = solve_triangular(factor, by, lower=True, check_finite=False)
+        chi = float(G[-1, -1]) / noise.floor**2 - float(half @ half)
+        whole = 2.0 * float(np.sum(np.log(np.diag(factor))))
+        part = np.linalg.cholesky(M[p:, p:]) if q else np.ones((1, 1))
+        random = 2.0 * float(np.sum(np.log(np.diag(part))))
+        own = determinant + 2.0 * len(self._at.residual) * np.log(noise.floor)
+        rest = chi + own + self._prior(noise, taus, noise.floor * ratio)
+        return rest + whole, rest + random
+
+    def with_slope(self, x: Array) -> tuple[float, Array]:
+        """The restricted one with its derivatives, by differences."""
+        value = self.cost(x)[0]
+        step = DIFFERENCE * np.maximum(1.0, np.abs(x))
+        moved = x + np.diag(step)
+        return value, np.array([self.cost(at)[0] - value for at in moved]) / step
+
+    def white(self, x: Array) -> Array:
+        """Residual that is left with the specimens' deviations, but without smooth lines, white."""
+        noise, taus, omega = self.split(x)
+        W = self._unit_white(noise) / noise.floor
+        p = self._common.shape[1]
+        A = W[:, :-1] * np.concatenate([np.ones(p), self._scales(taus, omega * noise.floor)])
+        q = A.shape[1] - p
+        stacked = np.concatenate([A, np.eye(p + q)[p:]])
+        y = np.concatenate([W[:, -1], np.zeros(q)])
+        solution = np.linalg.lstsq(stacked, y, rcond=None)[0]
+        kept = p + sum(block.shape[1] for block in self._blocks)
+        return np.asarray(W[:, -1] - A[:, :kept] @ solution[:kept])
+
+    def _scales(self, taus: Array, omega: float) -> Array:
+        """Of the random columns."""
+        parts = [np.full(b.shape[1], tau) for b, tau in zip(self._blocks, taus, strict=True)]
+        return np.concatenate([*parts, np.full(self._lines.shape[1], omega)])
+
+    def _unit_white(self, noise: Noise) -> Array:
+        """All columns and the residual, white for a floor of one."""
+        at = self._at
+        unit = Noise(1.0, noise.share / noise.floor, noise.correlation)
+        whiten = unit.whitener(at.readings, at.rows)
+        self._determinant = whiten.log_determinant
+        sizes = unit.sigma(at.readings)[at.rows]
+        lines = self._lines * sizes[:, None]
+        columns = [self._common, *self._blocks, lines, at.residual[:, None]]
+        return whiten(np.concatenate(columns, axis=1))
+
+    def _whitened(self, noise: Noise) -> tuple[Array, float, float]:
+        """Products of these columns, log determinant, and rms of sigma, all for a floor of one."""
+        key = (noise.share / noise.floor, noise.correlation)
+        if key not in self._known:
+            if len(self._known) > KEPT:
+                self._known.clear()
+            W = self._unit_white(noise)
+            typical = Noise(1.0, key[0], key[1]).typical(self._at.readings, self._at.rows)
+            self._known[key] = (W.T @ W, self._determinant, typical)
+        return self._known[key]
+
+    def _prior(self, noise: Noise, taus: Array, typical: float) -> float:
+        prior = float(np.sum((taus / self._usual) ** 2))
+        prior += (noise.share / CRITERIA.usual_share) ** 2
+        if self._given is not None:
+            prior += (np.log(typical / self._given) / CRITERIA.stated_within) ** 2
+        return prior
+
+
+def _lines(readings: Readings, rows: Flags) -> Array:
+    """Smooth functions of the place along each chain of readings, cubic B-splines, (n, m)."""
+    chain = readings.chain[rows]
+    columns: list[Array] = []
+    for number in np.unique(chain):
+        own = np.flatnonzero(chain == number)
+        if len(own) < 2 * CRITERIA.readings_per_knot:
+            continue
+        pieces = int(np.clip(len(own) // CRITERIA.readings_per_knot, 1, CRITERIA.most_knots))
+        knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, pieces + 1), [1.0] * 3])
+        basis = BSpline.design_matrix(np.linspace(0.0, 1.0, len(own)), knots, 3).toarray()
+        block: Any = np.zeros((len(chain), basis.shape[1]))
+        block[own] = basis
+        columns.append(block)
+    return np.concatenate(columns, axis=1) if columns else np.zeros((len(chain), 0))
