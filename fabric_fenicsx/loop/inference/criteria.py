@@ -33,12 +33,15 @@ class Criteria:
         most_missed: largest share of a run that may be left out so; made-up.
         structure_p: chance below which a test says that a residual has structure; convention.
         hopeless_p: ... below which no small size excuses that structure; made-up.
+        other_form: share of what the baseline misses that another form of the same effect may
+            leave; made-up.
         decisive: −2 log likelihood, penalised, by which a model of more effects must win, and by
             which a rival may lose; convention (Kass & Raftery, J. Am. Stat. Assoc. 90, 1995: very
             strong evidence).
         significant: standard errors that an amplitude must be from nothing; convention.
         near: error over noise up to which a model explains what it was fitted to, and what it was
             not, if the residual has structure; made-up.
+        settled: ... up to which no further effect is looked for; made-up.
         scatter: ... and if it has none: nobody knows their noise better; made-up.
         usual_scatter: of specimens, as a share of a parameter (half-normal prior); convention.
         laboratories: ... where they are from several laboratories; published.
@@ -72,9 +75,11 @@ class Criteria:
     most_missed: float = 0.03
     structure_p: float = 1e-3
     hopeless_p: float = 1e-8
+    other_form: float = 0.06
     decisive: float = 10.0
     significant: float = 2.0
     near: float = 1.15
+    settled: float = 1.03
     scatter: float = 1.25
     usual_scatter: float = 0.12
     laboratories: float = 0.6

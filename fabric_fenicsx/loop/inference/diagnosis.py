@@ -12,6 +12,7 @@ from .curve import Curve
 from .effects import Effect
 from .experiment import Experiment
 from .fitting import Fit
+from .judge import Laboratory
 from .noise import Noise, Whiteness
 
 __all__ = ["Candidate", "Diagnosis", "Verdict"]
@@ -61,6 +62,7 @@ class Diagnosis:
         white_before, white_after: tests of the residuals.
         outliers: readings that were left out, (n,).
         curve: what readings know that are all on one curve; None where they know more.
+        laboratories: where there are several folders, what the others say of each.
         of_the_curve: effects that are such a curve, where one was looked for.
     """
 
@@ -86,4 +88,5 @@ class Diagnosis:
     outliers: Flags
     curve: Curve | None = None
     of_the_curve: tuple[str, ...] = ()
+    laboratories: tuple[Laboratory, ...] = ()
     notes: list[str] = field(default_factory=list)

@@ -8,7 +8,7 @@ scatter by (see variances): the mode of a mixed-effects model. Where τ is nothi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -38,6 +38,8 @@ Array = npt.NDArray[np.float64]
 LEAST_KNOWN = 1e-14
 #: Scatter below which specimens are taken to be alike.
 ALIKE = 1e-4
+#: Standard errors from a bound that are none.
+NEAR_BOUND = 1e-3
 #: A specimen's parameter keeps its sign.
 LEAST_DEVIATION = -0.95
 
@@ -300,7 +302,7 @@ class _Model:
             values=dict(zip(self._names, x[:p].tolist(), strict=True)),
             std=dict(zip(self._names, std[:p].tolist(), strict=True)),
             correlated=tuple((self._names[i], self._names[j]) for i, j in np.argwhere(near)),
-            at_bound=tuple(n for n, end in zip(self._names, active, strict=False) if end),
+            at_bound=tuple(self._at_bound(x, std, np.asarray(active))),
             converged=bool(converged),
             residual=residual,
             expected=expected,
@@ -312,6 +314,13 @@ class _Model:
             white=self._whiten(residual[self._used]),
             readings=self._readings,
         )
+
+    def _at_bound(self, x: Array, std: Array, active: Array) -> Iterator[str]:
+        """Parameters on a bound, or so near that their standard error does not see the distance."""
+        for k, p in enumerate(self._parameters):
+            away = min(float(x[k]) - p.lower, p.upper - float(x[k]))
+            if active[k] or away < NEAR_BOUND * std[k]:
+                yield p.name
 
     def _deviations(self, x: Array) -> dict[str, Array]:
         """By group, of every specimen."""

@@ -23,10 +23,10 @@ from .effects import Effect
 from .experiment import Experiment
 from .fitting import Fit, linearised
 from .noise import Whiteness, missed_readings, outliers, whiteness
-from .validation import CrossValidation, cross_validated, parts_by, stretches
+from .validation import CrossValidation, cross_validated, fitted_without, parts_by, stretches
 from .variances import Estimate, Variances, chance_of_no_misfit, estimate
 
-__all__ = ["Judge", "Misfit", "Model"]
+__all__ = ["Judge", "Laboratory", "Misfit", "Model"]
 
 Flags = npt.NDArray[np.bool_]
 
@@ -62,6 +62,25 @@ class Misfit:
     variances: Variances
     noise: float
     whiteness: Whiteness
+
+
+@dataclass(frozen=True, slots=True)
+class Laboratory:
+    """Readings of one folder, foretold from other folders.
+
+    Attributes:
+        folder: its number.
+        own: root mean square error with its own readings among those that are fitted.
+        foretold: error of what the others say of it.
+        expected: what they expect it to be, as laboratories and specimens differ.
+        size: root mean square of the readings.
+    """
+
+    folder: int
+    own: float
+    foretold: float
+    expected: float
+    size: float
 
 
 class Judge:
@@ -152,19 +171,27 @@ class Judge:
             self._misfits[model.fit] = Misfit(lined.variances, noise, white)
         return self._misfits[model.fit]
 
-    def fits(self, model: Model) -> bool:
-        """Whether a model leaves noise, in size, on what it was fitted to."""
+    def fits(self, model: Model, baseline: Model) -> bool:
+        """Whether a model leaves noise, in size, on what it was fitted to.
+
+        Structure may be left that is small beside noise; where it is beyond doubt, only what is
+        also small beside what the baseline missed: another form of the same effect.
+        """
         found = self.misfit(model)
-        if found.whiteness.least < CRITERIA.hopeless_p:
-            return False
         used, freedom = model.fit.used, model.fit.freedom
         left = model.fit.rms(used) * float(np.sqrt(used.sum() / freedom))
+        if found.whiteness.least < CRITERIA.hopeless_p:
+            missed, before = (
+                max(rms**2 - found.noise**2, 0.0) for rms in (left, baseline.fit.rms(used))
+            )
+            if missed >= CRITERIA.other_form**2 * before:
+                return False
         allowed = CRITERIA.near if found.whiteness.structured else CRITERIA.scatter
         return left <= found.noise * max(allowed, self._by_chance(model, freedom))
 
-    def explains(self, model: Model) -> bool:
+    def explains(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise, in what it was fitted to and in what it was not."""
-        return self.fits(model) and self.foretells(model)
+        return self.fits(model, baseline) and self.foretells(model)
 
     def foretells(self, model: Model) -> bool:
         """Whether a model predicts what was left out, as well as its parameters are known."""
@@ -179,10 +206,11 @@ class Judge:
         limit = max(CRITERIA.scatter, self._by_chance(model, count))
         return bool(error * noise <= limit * max(self.misfit(model).noise, 0.0))
 
-    def settled(self, model: Model) -> bool:
-        """Whether a model leaves noise alone."""
-        white = self.misfit(model).whiteness
-        return not white.structured and self.explains(model)
+    def settled(self, model: Model, baseline: Model) -> bool:
+        """Whether a model leaves noise alone, or so little else that nothing can be made of it."""
+        found = self.misfit(model)
+        little = model.fit.rms(model.fit.used) < CRITERIA.settled * found.noise
+        return (little or not found.whiteness.structured) and self.explains(model, baseline)
 
     def improves(self, model: Model, on: Model) -> bool:
         """Whether stretches of the fitted readings are predicted better than by another model."""
@@ -243,6 +271,21 @@ class Judge:
             parts = stretches(self._readings, model.used)
             self._validated[key] = cross_validated(self._experiment, model, parts)
         return self._validated[key]
+
+    def laboratories(self, model: Fit, noise: float) -> list[Laboratory]:
+        """What is said of each folder's fitted readings by those of the others; none of one."""
+        found = []
+        folder = self._readings.folder
+        parts = parts_by(folder, model.used)
+        for part in parts if len(parts) > 1 else ():
+            other = fitted_without(self._experiment, model, part)
+            error = expected = float("nan")
+            if other is not None:
+                error = other.rms(part)
+                expected = float(np.hypot(noise, other.prediction_std(part)))
+            size = float(np.sqrt(np.mean(self._readings.observed[part] ** 2)))
+            found.append(Laboratory(int(folder[part][0]), model.rms(part), error, expected, size))
+        return found
 
     def _by_chance(self, model: Model, count: int) -> float:
         """Scatter over noise that is exceeded by chance once in a thousand."""

@@ -166,6 +166,7 @@ class _Search:
             outliers=self.judge.outliers,
             curve=curve,
             of_the_curve=self._of_the_curve(levels) if curve is not None else (),
+            laboratories=tuple(self.judge.laboratories(judged.fit, misfit.noise)),
             notes=[*self.experiment.notes, *self._notes(final.fit, baseline.fit)],
         )
 
@@ -178,9 +179,8 @@ class _Search:
             effect: {v: signatures(self.experiment, base, alike, v) for v in effect.variants}
             for effect in self.effects
         }
-        linear = ToFirstOrder(self.experiment, base, self.variances, self._robust)
-        screen = Screen(base, linear, signs)
-        self._base, self._screen = base, screen
+        self._base, self._signatures = base, signs
+        screen = self._screened()
         levels = [[self._refined(self.judge.weighed(base, ()))]]
         if not self.effects:
             return [], levels
@@ -200,15 +200,27 @@ class _Search:
         levels.append(self._best_refined(singles))
         for count in range(2, CRITERIA.most_effects + 1):
             best = min((m for level in levels for m in level), key=lambda m: m.criterion)
-            if len(self.effects) < count or not levels[-1] or self.judge.settled(best):
+            if (
+                len(self.effects) < count
+                or not levels[-1]
+                or self.judge.settled(best, levels[0][0])
+            ):
                 break
             self.progress(0.5 + 0.15 * (count - 2), f"fit {count} effects together")
+            # With noise as the best model leaves it.
+            self._use(best.fit)
+            self._base = self._baseline(self._base.values)
             levels.append(self._together(count))
         return candidates, [level for level in levels if level]
 
+    def _screened(self) -> Screen:
+        """All effects to first order about the baseline, with the variances as they are now."""
+        linear = ToFirstOrder(self.experiment, self._base, self.variances, self._robust)
+        return Screen(self._base, linear, self._signatures)
+
     def _together(self, count: int) -> list[Model]:
         """Models of several effects, the best first."""
-        combinations = self._screen.best(CRITERIA.combinations, count)
+        combinations = self._screened().best(CRITERIA.combinations, count)
         fits = self._fitted(combinations, starts=1)
         return self._best_refined(self._weighed([(f, self._effects_of(f)) for f in fits]))
 
@@ -311,11 +323,11 @@ class _Search:
 
     def _verdict(self, baseline: Model, chosen: Model) -> Verdict:
         if not chosen.effects:
-            return "no_effect" if self.judge.explains(baseline) else "unexplained"
+            return "no_effect" if self.judge.explains(baseline, baseline) else "unexplained"
         if self.experiment.one_curve is not None:
             # Every effect can be such a curve: none is told from the others.
             return "unexplained"
-        return "effect_found" if self.judge.explains(chosen) else "unexplained"
+        return "effect_found" if self.judge.explains(chosen, baseline) else "unexplained"
 
     def _curve(self, model: Model) -> Curve | None:
         known = self.experiment.one_curve
@@ -341,7 +353,7 @@ class _Search:
                 known = [m for m in levels[len(final.effects)] if set(m.effects) == {other, *kept}]
                 if kept and not known:
                     forms = [v for v in final.fit.variants if self._effects_of_form(v) is not own]
-                    fits = self._fitted(self._screen.instead(forms, other), starts=1)
+                    fits = self._fitted(self._screened().instead(forms, other), starts=1)
                     known = self._best_refined(
                         self._weighed([(f, self._effects_of(f)) for f in fits])
                     )

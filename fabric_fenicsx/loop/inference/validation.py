@@ -14,7 +14,14 @@ from .effects import Variant
 from .experiment import Experiment, Readings
 from .fitting import Fit, fit
 
-__all__ = ["CrossValidation", "cross_validated", "has_own", "parts_by", "stretches"]
+__all__ = [
+    "CrossValidation",
+    "cross_validated",
+    "fitted_without",
+    "has_own",
+    "parts_by",
+    "stretches",
+]
 
 Flags = npt.NDArray[np.bool_]
 
@@ -63,21 +70,8 @@ def cross_validated(experiment: Experiment, model: Fit, parts: Sequence[Flags]) 
     """Predict parts of what a model was fitted to, each from the others."""
     total, allowed, count, failed = 0.0, 0.0, 0, 0
     for part in parts:
-        rest = model.used & ~part
-        variants = _within(model.variants, model.readings.run[rest])
-        try:
-            if rest.sum() <= len(model.values) or not part.any():
-                raise SolveError("too few readings")
-            again = fit(
-                experiment,
-                variants,
-                model.values,
-                rest,
-                model.variances,
-                deviations=model.deviations,
-                evaluations=25,
-            )
-        except SolveError:
+        again = fitted_without(experiment, model, part)
+        if again is None:
             failed += 1
             continue
         size = int(part.sum())
@@ -88,6 +82,28 @@ def cross_validated(experiment: Experiment, model: Fit, parts: Sequence[Flags]) 
         return CrossValidation(float("nan"), float("nan"), len(parts), failed)
     error, predictive = float(np.sqrt(total / count)), float(np.sqrt(allowed / count))
     return CrossValidation(error, predictive, len(parts), failed)
+
+
+def fitted_without(experiment: Experiment, model: Fit, part: Flags) -> Fit | None:
+    """A model fitted to the rest of its readings.
+
+    None where too few readings are left or the model has no solution.
+    """
+    rest = model.used & ~part
+    if rest.sum() <= len(model.values) or not part.any():
+        return None
+    try:
+        return fit(
+            experiment,
+            _within(model.variants, model.readings.run[rest]),
+            model.values,
+            rest,
+            model.variances,
+            deviations=model.deviations,
+            evaluations=25,
+        )
+    except SolveError:
+        return None
 
 
 def has_own(variants: Sequence[Variant]) -> bool:

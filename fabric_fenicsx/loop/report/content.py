@@ -86,6 +86,9 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
         "noise_model": noise_model(d),
         "scatter": scatter(d.final),
         "holdout_expected": d.holdout_expected,
+        "laboratories": [
+            asdict(lab) | {"folder": str(measurements[lab.folder].folder)} for lab in d.laboratories
+        ],
         "curve": None if d.curve is None else _curve(d),
         "holdout_source": d.holdout_source,
         "model": _numbers(d, d.final, d.holdout_after),
