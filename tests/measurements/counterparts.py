@@ -6,6 +6,8 @@ effect, are not among them, nor is a load cell whose zero and drift are each run
 one of a drift. Where an effect has one form alone, nothing can be left out.
 """
 
+from __future__ import annotations
+
 __all__ = ["COUNTERPARTS"]
 
 SLIDING = ("sliding only", "sliding, growing with the angle")
