@@ -35,9 +35,9 @@ SLIP = Parameter(
 )
 CUBIC = Parameter("b_N_mm3", amplitude=True, meaning="moment per width and curvature³")
 FIRST_SLIP = replace(
-    SLIP, starts=(0.03, 0.15), lower=0.002, upper=0.3, meaning="curvature at which the first slip"
+    SLIP, starts=(0.05, 0.2), upper=0.25, meaning="curvature at which the first slip"
 )
-SLIPS = (1.0, 3.0, 9.0)
+SLIPS = (1.0, 4.0)
 """Multiples of the first curvature of slip at which bundles side by side slip."""
 YIELDS = tuple(
     replace(
