@@ -53,6 +53,7 @@ from .mechanics.laws import LAWS as LAWS
 from .mechanics.laws.law import Crossing as Crossing
 from .mechanics.laws.law import CrossingLaw as CrossingLaw
 from .mechanics.laws.law import Form as Form
+from .mechanics.laws.law import Times as Times
 from .mechanics.laws.law import in_degrees as in_degrees
 from .mechanics.laws.law import number as number
 from .mechanics.laws.law import per_area as per_area

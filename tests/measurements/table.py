@@ -1,9 +1,10 @@
 """The sixty sets diagnosed, as a table: what was put in, what was said, and the errors.
 
-    python tests/measurements/table.py SEED [SEED ...] [--only TEXT] [--page FILE]
+    python tests/measurements/table.py SEED [SEED ...] [--only TEXT] [--leave-out] [--page FILE]
 
 An answer is right where the verdict is, and where the names are, each itself or as one of the
-rivals that were named with it.
+rivals that were named with it. With --leave-out every set of one effect is diagnosed without the
+forms of the library that have the shape put in; with --page the page has both.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
@@ -23,9 +24,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
+from fabric_fenicsx.loop.inference.effects import Effect
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.kinds import kind_of
-from measurements.sets import sixty
+from measurements.counterparts import COUNTERPARTS
+from measurements.sets import Recipe, sixty
 from measurements.writing import Truth
 
 OPENING = """# The loop on made-up sets
@@ -38,6 +41,13 @@ held-out errors over the noise put in; `expected` is what the fit itself expects
 the uncertainty of its parameters, where whole runs are held out. Written by
 `tests/measurements/table.py --page`.
 """
+LEFT_OUT = """## Leave one form out
+
+The sets of one effect again, each without the forms of the library that have the very shape put in
+(`tests/measurements/counterparts.py`): a fabric has none of our formulas. An answer is right where
+the effect is still named, itself or as a rival.
+"""
+HEAD = "| seed | set | put in | said | rivals | before | after | expected | |\n|" + "---|" * 9
 
 
 @dataclass(frozen=True)
@@ -72,17 +82,26 @@ class Row:
         return self.truth.verdict == "no_effect" and self.verdict != "no_effect"
 
 
-def rows(seeds: list[int], only: str = "") -> Iterator[Row]:
-    """Write, diagnose and judge the sets of some seeds."""
+def rows(seeds: list[int], only: str = "", *, leave_out: bool = False) -> Iterator[Row]:
+    """Write, diagnose and judge the sets of some seeds.
+
+    Args:
+        seeds: of the sets.
+        only: text in the names of those taken.
+        leave_out: take those of one effect, without the forms of the library that made them.
+    """
     for seed in seeds:
         for recipe in sixty(seed):
-            if only not in recipe.name:
+            if only not in recipe.name or (leave_out and not _counterparts(recipe)):
                 continue
             with tempfile.TemporaryDirectory() as folder:
                 truth = recipe(Path(folder) / "set")
                 measurement = read_measurement(Path(folder) / "set")
+                experiment = kind_of(measurement.test).experiment([measurement], ())
+                if leave_out:
+                    experiment.effects = _without(experiment.effects, *_counterparts(recipe))
                 try:
-                    found = diagnose_test(kind_of(measurement.test).experiment([measurement], ()))
+                    found = diagnose_test(experiment)
                 except SolveError:
                     nothing = (float("nan"), float("nan"))
                     yield Row(seed, recipe.name, truth, "not fitted", (), {}, *nothing)
@@ -98,6 +117,26 @@ def rows(seeds: list[int], only: str = "") -> Iterator[Row]:
                 found.holdout_after / truth.noise,
                 _expected(found),
             )
+
+
+def _counterparts(recipe: Recipe) -> tuple[str, tuple[str, ...]] | None:
+    """The one effect of a set and the labels of its literal forms; None where there are none."""
+    effects = recipe.options.get("effects", ())
+    if len(effects) != 1 or not recipe.name.startswith(effects[0][0]):
+        return None
+    ((name, form),) = effects
+    labels = COUNTERPARTS.get(name, {}).get(form)
+    return labels and (name, labels)
+
+
+def _without(effects: Sequence[Effect], name: str, labels: tuple[str, ...]) -> list[Effect]:
+    """Candidates without some forms of an effect."""
+
+    def left(effect: Effect) -> Effect:
+        kept = tuple(v for v in effect.variants if effect.name != name or v.label not in labels)
+        return replace(effect, variants=kept)
+
+    return [effect for effect in map(left, effects) if effect.variants]
 
 
 def _expected(found: Diagnosis) -> float:
@@ -140,22 +179,31 @@ def summary(table: list[Row]) -> str:
     )
 
 
+def printed(seeds: list[int], only: str, *, leave_out: bool) -> list[str]:
+    """Print the table as it comes; its summary, head and lines."""
+    print(HEAD)
+    table = []
+    for row in rows(seeds, only, leave_out=leave_out):
+        table.append(row)
+        print(line(row), flush=True)
+    print(f"\n{summary(table)}\n")
+    return [summary(table) + ".\n", HEAD, *map(line, table)]
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the table, or both."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("seeds", type=int, nargs="+")
     parser.add_argument("--only", default="")
+    parser.add_argument("--leave-out", action="store_true")
     parser.add_argument("--page", type=Path)
     given = parser.parse_args()
-    head = "| seed | set | put in | said | rivals | before | after | expected | |\n|" + "---|" * 9
-    print(head)
-    table = []
-    for row in rows(given.seeds, given.only):
-        table.append(row)
-        print(line(row), flush=True)
-    print(f"\n{summary(table)}")
+    lines = []
+    if given.page is not None or not given.leave_out:
+        lines += [OPENING, *printed(given.seeds, given.only, leave_out=False)]
+    if given.page is not None or given.leave_out:
+        lines += ["", LEFT_OUT, *printed(given.seeds, given.only, leave_out=True)]
     if given.page is not None:
-        lines = [OPENING, summary(table) + ".\n", head, *map(line, table)]
         given.page.write_text("\n".join(lines) + "\n")
 
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from ufl import max_value, min_value
 
 from ...inputs.parameters import Parameter
-from .law import Crossing, CrossingLaw, Form, in_degrees, per_area
+from .law import Crossing, CrossingLaw, Form, Times, in_degrees, per_area
 
 __all__ = ["LIMIT", "CoulombFriction", "friction_numbers"]
 
@@ -23,6 +23,29 @@ def friction_numbers(
     about = "shear until the friction slides"
     stick_angle = Parameter(f"slip_angle{index}_rad", starts, 1e-4, 0.3, meaning=about)
     return {"limit": replace(LIMIT, name=f"m_c{index}_N"), "stick_angle": stick_angle}
+
+
+FIRST_SLIP = Parameter(
+    "slip_angle_rad",
+    (0.005, 0.02, 0.06),
+    0.001,
+    0.1,
+    meaning="shear until the first slider slides",
+    share_of="angle",
+)
+
+
+def _sliders(*multiples: float) -> tuple[dict[str, Any], ...]:
+    """Sliders side by side (W. D. Iwan, J. Appl. Mech. 33, 1966), each with a limit of its own."""
+    return tuple(
+        {
+            "limit": replace(
+                LIMIT, name=f"m_c{k}_N", meaning=f"of the slider with {r:g} times the slip angle"
+            ),
+            "stick_angle": Times(r, FIRST_SLIP),
+        }
+        for k, r in enumerate(multiples, 1)
+    )
 
 
 @dataclass(frozen=True)
@@ -49,6 +72,8 @@ class CoulombFriction(CrossingLaw):
             (friction_numbers("1", (0.003, 0.015)), friction_numbers("2", (0.05, 0.15))),
             rank=4,
         ),
+        # Near any hysteresis that does not depend on the rate, whatever its formula.
+        Form("crossover_friction", "sliders side by side", _sliders(1.0, 2.5, 6.0), rank=5),
     )
 
     @property

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ...inputs.groups import NotNegative
 from ...inputs.parameters import Parameter
-from .law import Crossing, CrossingLaw, Form, asinh, number, per_area
+from .law import Crossing, CrossingLaw, Form, Times, asinh, number, per_area
 
 __all__ = ["EyringDashpot", "LinearDashpot", "PowerDashpot"]
 
@@ -18,6 +18,11 @@ N = Parameter("n", (0.3, 0.6, 1.5, 2.0), 0.1, 4.0, meaning="power of the rate")
 C = Parameter("c_N", lower=0.0, amplitude=True, meaning="moment per e of the rate")
 ABOUT = "rate about which the moment bends over"
 RATE = Parameter("rate_rad_s", (1e-3, 0.03, 0.3), 1e-4, 3.0, meaning=ABOUT, share_of="rate")
+
+
+def _thickening(index: int, power: float) -> dict[str, Any]:
+    c = replace(C_N, name=f"c_n{index}_N_s_n", meaning=f"moment per rate^{power:g}")
+    return {"c": c, "power": power}
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,11 @@ class PowerDashpot(CrossingLaw):
     floor: float = 1e-5
 
     law = "power_dashpot"
-    forms = (Form("rate_hardening", "power law", ({"c": C_N, "power": N, "floor": 1e-7},)),)
+    forms = (
+        Form("rate_hardening", "power law", ({"c": C_N, "power": N, "floor": 1e-7},)),
+        # Beside the baseline's linear dashpot, which may be less for it: near any that thickens.
+        Form("rate_hardening", "powers 1.5 and 3", (_thickening(1, 1.5), _thickening(2, 3.0))),
+    )
 
     def moment(self, at: Crossing) -> Any:
         """The rounded power of the rate."""
@@ -77,7 +86,18 @@ class EyringDashpot(CrossingLaw):
 
     law = "eyring_dashpot"
     name = "Eyring dashpot"
-    forms = (Form("rate_hardening", "Eyring", ({"c": C, "rate": RATE},)),)
+    forms = (
+        Form("rate_hardening", "Eyring", ({"c": C, "rate": RATE},)),
+        # Two processes (T. Ree and H. Eyring, J. Appl. Phys. 26, 1955): near any that thins.
+        Form(
+            "rate_hardening",
+            "Ree-Eyring",
+            tuple(
+                {"c": replace(C, name=f"c{k}_N"), "rate": Times(r, RATE)}
+                for k, r in ((1, 1.0), (2, 10.0))
+            ),
+        ),
+    )
 
     def moment(self, at: Crossing) -> Any:
         """Odd in the rate."""

@@ -27,6 +27,7 @@ __all__ = [
     "CrossingLaw",
     "Form",
     "Number",
+    "Times",
     "asinh",
     "in_degrees",
     "number",
@@ -122,6 +123,19 @@ def _converted(given: Number, value: Any, area: float) -> Any:
 
 
 @dataclass(frozen=True, slots=True)
+class Times:
+    """A multiple of a parameter, which several laws of a form share.
+
+    Attributes:
+        factor: [-].
+        parameter: what is fitted.
+    """
+
+    factor: float
+    parameter: Parameter
+
+
+@dataclass(frozen=True, slots=True)
 class Form:
     """A law, or several of its kind at once, as a form of an effect in a picture frame.
 
@@ -129,7 +143,8 @@ class Form:
         effect: name of the effect; several laws may be forms of the same.
         label: what tells it from the effect's other forms.
         instances: for each law its numbers by their names in the class, a Parameter where it is
-            fitted. Moments are per area of fabric [N], angles in rad. Amplitudes come first.
+            fitted or a multiple of one. Moments are per area of fabric [N], angles in rad.
+            Amplitudes come first.
         meaning: of an effect that nobody has described yet, one line.
         rank: forms come in this order; `synthesise` takes the first where none is named.
     """
@@ -142,16 +157,20 @@ class Form:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """What is fitted."""
-        numbers = (value for one in self.instances for value in one.values())
-        return tuple(value for value in numbers if isinstance(value, Parameter))
+        """What is fitted, each once."""
+        numbers = [value for one in self.instances for value in one.values()]
+        fitted = [value.parameter if isinstance(value, Times) else value for value in numbers]
+        return tuple(dict.fromkeys(value for value in fitted if isinstance(value, Parameter)))
 
     def laws(self, law: type[CrossingLaw], values: Mapping[str, Any]) -> tuple[CrossingLaw, ...]:
         """The laws with the values of the parameters, by the parameters' names."""
-        return tuple(
-            law(**{n: values[v.name] if isinstance(v, Parameter) else v for n, v in one.items()})
-            for one in self.instances
-        )
+
+        def number(given: Any) -> Any:
+            if isinstance(given, Times):
+                return given.factor * values[given.parameter.name]
+            return values[given.name] if isinstance(given, Parameter) else given
+
+        return tuple(law(**{n: number(v) for n, v in one.items()}) for one in self.instances)
 
 
 class CrossingLaw:

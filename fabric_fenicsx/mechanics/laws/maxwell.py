@@ -3,26 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ufl import exp, sinh, sqrt
 
 from ...inputs.groups import NotNegative
 from ...inputs.parameters import Parameter
-from .law import Crossing, CrossingLaw, Form, asinh, number, per_area
+from .law import Crossing, CrossingLaw, Form, Times, asinh, number, per_area
 
 __all__ = ["Maxwell"]
 
 
 CUBIC = Parameter("cubic_1_rad2", (1.0, 3.0), 0.0, 50.0, meaning="of its spring")
+STIFFNESS = Parameter("k_maxwell_N", lower=0.0, amplitude=True, meaning="stiffness of the branch")
+#: Beyond this share of the longest run the slowest branch of a spectrum would be another spring.
+SHORTEST = Parameter(
+    "relaxation_time_s",
+    (0.003, 0.012, 0.05),
+    1e-3,
+    0.2,
+    meaning="shortest relaxation time",
+    share_of="duration",
+)
 
 
 def _branch(index: str, starts: tuple[float, ...]) -> dict[str, Any]:
-    about, name = "stiffness of the branch", f"relaxation_time{index}_s"
-    k = Parameter(f"k_maxwell{index}_N", lower=0.0, amplitude=True, meaning=about)
+    name = f"relaxation_time{index}_s"
     tau = Parameter(name, starts, 1e-3, 10.0, meaning="its relaxation time", share_of="duration")
-    return {"stiffness": k, "relaxation_time": tau}
+    return {"stiffness": replace(STIFFNESS, name=f"k_maxwell{index}_N"), "relaxation_time": tau}
+
+
+def _spectrum(*multiples: float, **cubic: Parameter) -> tuple[dict[str, Any], ...]:
+    """Branches of times that lie apart by factors: near any fading memory."""
+    return tuple(
+        {
+            "stiffness": replace(
+                STIFFNESS, name=f"k_maxwell{k}_N", meaning=f"of the branch of {r:g} times that"
+            ),
+            "relaxation_time": Times(r, SHORTEST),
+            **cubic,
+        }
+        for k, r in enumerate(multiples, 1)
+    )
 
 
 @dataclass(frozen=True)
@@ -61,6 +84,13 @@ class Maxwell(CrossingLaw):
             "crossover_relaxation",
             "two branches",
             (_branch("", (0.1, 0.4)), _branch("2", (0.01, 0.04))),
+        ),
+        Form("crossover_relaxation", "spectrum", _spectrum(1.0, 4.0, 16.0), rank=1),
+        Form(
+            "crossover_relaxation",
+            "spectrum, cubic",
+            _spectrum(1.0, 4.0, 16.0, cubic=CUBIC),
+            rank=2,
         ),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ufl import max_value, min_value, tanh
@@ -10,7 +10,7 @@ from ufl import max_value, min_value, tanh
 from ...inputs.groups import NotNegative
 from ...inputs.parameters import Parameter
 from .coulomb import LIMIT
-from .law import Crossing, CrossingLaw, Form, number, per_area
+from .law import Crossing, CrossingLaw, Form, Times, number, per_area
 
 __all__ = ["SlidingFriction"]
 
@@ -49,6 +49,15 @@ class SlidingFriction(CrossingLaw):
             "sliding, growing with the angle",
             ({"limit": LIMIT, "rounding": ROUNDING, "growth": GROWTH},),
             rank=3,
+        ),
+        Form(
+            "crossover_friction",
+            "sliding, rounded twice",
+            tuple(
+                {"limit": replace(LIMIT, name=f"m_c{k}_N"), "rounding": Times(r, ROUNDING)}
+                for k, r in ((1, 1.0), (2, 6.0))
+            ),
+            rank=6,
         ),
     )
 

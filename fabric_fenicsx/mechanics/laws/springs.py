@@ -51,10 +51,16 @@ class PolynomialSpring(CrossingLaw):
         yield 3, self.k3
 
 
-def _even(power: int) -> Form:
-    meaning = f"even elastic moment per angle^{power}"
-    k = Parameter(f"k_even{power}_N", amplitude=True, meaning=meaning)
-    return Form("tension_coupling", f"power {power}", ({"stiffness": k, "power": power},))
+def _even(*powers: int) -> Form:
+    """Powers of an even function; several, near any."""
+
+    def term(power: int) -> dict[str, Any]:
+        meaning = f"even elastic moment per angle^{power}"
+        k = Parameter(f"k_even{power}_N", amplitude=True, meaning=meaning)
+        return {"stiffness": k, "power": power}
+
+    label = f"power {powers[0]}" if len(powers) == 1 else "powers " + ", ".join(map(str, powers))
+    return Form("tension_coupling", label, tuple(map(term, powers)), rank=len(powers) - 1)
 
 
 @dataclass(frozen=True)
@@ -74,7 +80,7 @@ class EvenSpring(CrossingLaw):
     law = "even_spring"
     interlaced = False
     of_fabric = False
-    forms = (_even(2), _even(1), _even(4))
+    forms = (_even(2), _even(1), _even(4), _even(1, 2, 4))
 
     def moment(self, at: Crossing) -> Any:
         """The power of |γ|."""

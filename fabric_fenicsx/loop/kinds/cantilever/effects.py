@@ -6,11 +6,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from ufl import max_value, min_value, tanh
 
-from ...inference.effects import Effect, Parameter
+from ...inference.effects import Effect, Parameter, Values
 from .variant import StripVariant
 
 __all__ = ["CANTILEVER_EFFECTS"]
@@ -33,6 +34,32 @@ SLIP = Parameter(
     share_of="curvature",
 )
 CUBIC = Parameter("b_N_mm3", amplitude=True, meaning="moment per width and curvature³")
+FIRST_SLIP = replace(
+    SLIP, starts=(0.05, 0.2), upper=0.25, meaning="curvature at which the first slip"
+)
+SLIPS = (1.0, 4.0)
+"""Multiples of the first curvature of slip at which bundles side by side slip."""
+YIELDS = tuple(
+    replace(
+        YIELD, name=f"m_s{k}_N", starts=(0.1,), meaning=f"of those that slip at {r:g} times that"
+    )
+    for k, r in enumerate(SLIPS, 1)
+)
+STIFFENING = replace(CUBIC, lower=0.0)
+
+
+def _slip(y: Any) -> Any:
+    """Stick, then slip."""
+    return max_value(min_value(y, 1), -1)
+
+
+def _bundles(p: Values, kappa: Any) -> Any:
+    """Bundles that slip one after the other, and what stiffens: near any odd curve that rises."""
+    slipping = (
+        p[m.name] * _slip(kappa / (r * p["kappa_s_1_mm"]))
+        for m, r in zip(YIELDS, SLIPS, strict=True)
+    )
+    return sum(slipping) + p["b_N_mm3"] * kappa**3
 
 
 def _slipping(label: str, share: Callable[[Any], Any]) -> StripVariant:
@@ -70,8 +97,11 @@ CANTILEVER_EFFECTS = (
             _slipping("hyperbolic", lambda y: y / (1 + abs(y))),
             # Beyond ±20 its derivatives, 1/cosh², would overflow on the way to zero.
             _slipping("tanh", lambda y: tanh(max_value(min_value(y, 20), -20))),
-            _slipping("stick, then slip", lambda y: max_value(min_value(y, 1), -1)),
+            _slipping("stick, then slip", _slip),
             StripVariant("cubic", (CUBIC,), moment=lambda p, kappa: p["b_N_mm3"] * kappa**3),
+            StripVariant(
+                "bundles side by side", (*YIELDS, STIFFENING, FIRST_SLIP), moment=_bundles
+            ),
         ),
     ),
     Effect(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
-from ufl import max_value, min_value
+from ufl import exp, ln, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws import LAWS
@@ -35,6 +36,21 @@ TRAVEL = Parameter(
     share_of="travel",
     jumps=True,
 )
+FREE = "crosshead travel before the frame engages"
+OUT, BACK = (
+    replace(
+        TRAVEL, name=f"free_travel_{way}_mm", starts=(0.0, 0.01, 0.04), meaning=f"{FREE}, {way}"
+    )
+    for way in ("out", "back")
+)
+ROUNDING = Parameter(
+    "gap_rounding_mm",
+    (0.005,),
+    1e-4,
+    0.05,
+    meaning="travel over which it engages",
+    share_of="travel",
+)
 
 
 def _slack(p: Values, D: Any, past: Any) -> Any:
@@ -62,6 +78,22 @@ def _play(behind: float, ahead: float) -> Callable[[Values, Any, Any], Any]:
     return travel
 
 
+def _soft_gap(p: Values, D: Any, past: Any) -> Any:
+    """A slope that goes from 0 to 1 at each end of the gap, over a width; square at the start."""
+    width = p["gap_rounding_mm"]
+
+    def engaged(x: Any) -> Any:
+        return max_value(x, 0) + width * ln(1 + exp(-abs(x) / width))
+
+    out, back = p["free_travel_out_mm"], p["free_travel_back_mm"]
+    return engaged(D - out) - engaged(-D - back) - (engaged(-out) - engaged(-back))
+
+
+def _play_of_each_side(p: Values, D: Any, past: Any) -> Any:
+    out, back = p["free_travel_out_mm"], p["free_travel_back_mm"]
+    return min_value(D + back, max_value(past, D - out))
+
+
 PICTURE_FRAME_EFFECTS = (
     *law_effects(LAWS.values(), OF_THE_LAW),
     Effect(
@@ -77,6 +109,13 @@ PICTURE_FRAME_EFFECTS = (
             ),
             FrameVariant(
                 "play on the way back", (TRAVEL,), travel=_play(0.0, 1.0), remembers_travel=True
+            ),
+            FrameVariant("soft gap", (OUT, BACK, ROUNDING), travel=_soft_gap),
+            FrameVariant(
+                "play, each side its own",
+                (OUT, BACK),
+                travel=_play_of_each_side,
+                remembers_travel=True,
             ),
         ),
         of_fabric=False,

@@ -1,0 +1,266 @@
+"""General forms of effects: that they come near the shapes of their families, by linear algebra.
+
+The moments of a form are linear in its amplitudes. At the readings of a loading to both sides, with
+rates and a hold, their columns beside the baseline's are fitted (non-negative least squares where
+amplitudes have a sign) to closed forms, for the best of many values of the form's one shape.
+"""
+
+from functools import cache, partial
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+from test_shear_laws import evaluated
+from ufl import as_ufl
+
+from fabric_fenicsx.loop.expressions.marching import Marched, Varying
+from fabric_fenicsx.loop.inference.effects import scaled
+from fabric_fenicsx.loop.kinds.cantilever.effects import CANTILEVER_EFFECTS
+from fabric_fenicsx.loop.kinds.picture_frame.effects import PICTURE_FRAME_EFFECTS
+from fabric_fenicsx.mechanics.laws.law import Crossing, Times
+from fabric_fenicsx.mechanics.laws.locking import Locking
+
+SHARES = dict.fromkeys(("angle", "duration", "rate", "travel", "curvature", "moment"), 1.0)
+
+
+@cache
+def named(effects, name, label):
+    """A form for data whose ranges are all one."""
+    (effect,) = (scaled(e, SHARES) for e in effects if e.name == name)
+    (found,) = (v for v in effect.variants if v.label == label)
+    return found
+
+
+def left(columns, free, target):
+    """Share of a curve, rms, that columns leave of it: free ones of any sign, the others not."""
+    J = np.column_stack([*free, *columns])
+    J = J / np.maximum(np.abs(J).max(axis=0), 1e-300)
+    lower = np.r_[np.full(len(free), -np.inf), np.zeros(len(columns))]
+    x = lsq_linear(J, target, (lower, np.inf), method="bvls").x
+    return np.linalg.norm(target - J @ x) / np.linalg.norm(target)
+
+
+def path():
+    """Time, angle and rate: out at one rate, a hold, to the other side and back at another."""
+    corners = np.array([[0.0, 0.0], [0.15, 1.0], [0.4, 1.0], [0.7, -1.0], [1.0, 1.0]])
+    time = np.linspace(0.0, 1.0, 401)
+    return time, np.interp(time, *corners.T), np.r_[0.0, np.diff(np.interp(time, *corners.T))] * 400
+
+
+TIME, GAMMA, RATE = path()
+X = np.linspace(-1.0, 1.0, 401)
+
+
+@cache
+def compiled(variant):
+    """The moments of a form's laws together."""
+    marched = Marched(
+        ("gamma", "gamma_n", "rate", "per_time"), tuple(p.name for p in variant.parameters)
+    )
+    at, moment, history = marched.at, 0.0, {}
+    for k, law in enumerate(variant.laws(at)):
+        crossing = Crossing(
+            at["gamma"],
+            at["gamma_n"],
+            at["per_time"],
+            lambda value: value,
+            lambda name, k=k: marched.remembered(f"{k} {name}"),
+            at["rate"],
+        )
+        moment = moment + law.moment(crossing)
+        history |= {f"{k} {name}": value for name, value in law.history(crossing).items()}
+    return marched.define({"moment": moment}, history)
+
+
+def columns(variant, shape, gammas=GAMMA, rates=RATE):
+    """Moments of a form for each amplitude of one."""
+    before = np.r_[0.0, gammas[:-1]]
+    inputs = {"gamma": gammas, "gamma_n": before, "rate": rates, "per_time": 400.0 + 0.0 * gammas}
+    given = {name: Varying(x[:, None]) for name, x in inputs.items()}
+    values = {p.name: 1.0 for p in variant.amplitudes} | shape
+    slopes = compiled(variant)(given, values)["moment"].slopes
+    return [np.broadcast_to(slopes[p.name], (len(gammas), 1))[:, 0] for p in variant.amplitudes]
+
+
+def nearest(name, label, target, free, gammas=GAMMA, rates=RATE, cubic=None, count=13):
+    """Least share left over the values of the form's shape; its bounds hold."""
+    variant = named(PICTURE_FRAME_EFFECTS, name, label)
+    shapes = [p for p in variant.shapes if p.name != "cubic_1_rad2"]
+    fixed = {} if cubic is None else {"cubic_1_rad2": cubic}
+    grid = [{}]
+    for p in shapes:
+        lower = max(p.lower, 1e-4)
+        space = np.linspace if p.share_of == "" and name == "shear_locking" else np.geomspace
+        grid = [{**g, p.name: s} for g in grid for s in space(lower, p.upper, count)]
+    return min(left(columns(variant, g | fixed, gammas, rates), free, target) for g in grid)
+
+
+def exact_steps(target):
+    """A moment whose change over a step of the path is a function of it and of the step."""
+    M = [0.0]
+    for step in np.diff(GAMMA):
+        M.append(target(M[-1], step))
+    return np.array(M)
+
+
+def slider(M, step, s=0.03):
+    return np.clip(M + step / s, -1.0, 1.0)
+
+
+def dahl(M, step, s=0.03):
+    limit = np.sign(step)
+    return limit + (M - limit) * np.exp(-abs(step) / s)
+
+
+@pytest.mark.parametrize(
+    ("law", "most"),
+    # First loading and reversal of Dahl's are not of one curve (Masing), those of sliders are.
+    [(slider, 0.02), (partial(slider, s=0.013), 0.02), (dahl, 0.04)],
+)
+def test_sliders_side_by_side_are_near_any_hysteresis(law, most):
+    free = [GAMMA, GAMMA**3]
+    assert nearest("crossover_friction", "sliders side by side", exact_steps(law), free) < most
+
+
+RATES = np.repeat([-1.0, -0.5, -0.2, -0.07, -0.02, 0.02, 0.07, 0.2, 0.5, 1.0], 3)
+STILL = np.zeros_like(RATES)
+
+
+@pytest.mark.parametrize("v", [1e-3, 0.02, 0.13, 0.25])
+def test_twice_rounded_sliding_is_near_other_roundings(v):
+    near = partial(nearest, "crossover_friction", "sliding, rounded twice")
+    for target in (np.tanh(RATES / v), 2.0 / np.pi * np.arctan(RATES / v)):
+        assert near(target, [RATES], STILL, RATES, count=40) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("target", "label", "most"),
+    [
+        (np.sign(RATES) * np.abs(RATES) ** 0.3, "Ree-Eyring", 0.02),
+        (np.sign(RATES) * np.abs(RATES) ** 0.7, "Ree-Eyring", 0.02),
+        (np.arcsinh(RATES / 0.05), "Ree-Eyring", 0.02),
+        (RATES / (0.2 + np.abs(RATES)), "Ree-Eyring", 0.02),
+        (np.sign(RATES) * np.abs(RATES) ** 1.3, "powers 1.5 and 3", 0.02),
+        (np.sign(RATES) * np.abs(RATES) ** 2.0, "powers 1.5 and 3", 0.02),
+    ],
+)
+def test_dashpots_that_thin_or_thicken(target, label, most):
+    assert nearest("rate_hardening", label, target, [RATES], STILL, RATES, count=40) < most
+
+
+def branch(tau, cubic=0.0):
+    """Maxwell's branch along the path, exact for straight steps."""
+    spring = GAMMA + cubic * GAMMA**3
+    q, h = [0.0], TIME[1]
+    for step in np.diff(spring):
+        q.append(q[-1] * np.exp(-h / tau) + step * tau / h * (1.0 - np.exp(-h / tau)))
+    return np.array(q)
+
+
+@pytest.mark.parametrize(
+    ("target", "label", "cubic"),
+    [
+        (branch(0.02), "spectrum", None),
+        (branch(0.13), "spectrum", None),
+        (branch(0.03) + 0.6 * branch(0.2), "spectrum", None),
+        # A power law of creep, and what it becomes on a stiffening spring.
+        (sum(branch(t) * t**-0.3 for t in np.geomspace(0.003, 3.0, 12)), "spectrum", None),
+        (branch(0.05, 2.0), "spectrum, cubic", 2.0),
+    ],
+)
+def test_a_spectrum_is_near_any_fading_memory(target, label, cubic):
+    free = [GAMMA, GAMMA**3, RATE]
+    assert nearest("crossover_relaxation", label, target, free, cubic=cubic) < 0.02
+
+
+BEYOND = np.maximum(np.abs(X) - 0.65, 0.0)
+
+
+@pytest.mark.parametrize(
+    "size",
+    [BEYOND, BEYOND**2, BEYOND**3, BEYOND**4, np.expm1(BEYOND / 0.1), np.tan(3.0 * BEYOND)],
+)
+def test_a_series_beyond_an_angle_is_near_any_locking(size):
+    target = np.sign(X) * size
+    free = [X, X**3]
+    assert nearest("shear_locking", "series", target, free, X, 0.0 * X, count=67) < 0.02
+
+
+@pytest.mark.parametrize(
+    "target", [np.abs(X), X**2, np.abs(X) ** 3, X**4, 1.0 / np.cos(X) - 1.0, np.abs(np.sin(X))]
+)
+def test_even_powers_are_near_any_even_force(target):
+    variant = named(PICTURE_FRAME_EFFECTS, "tension_coupling", "powers 1, 2, 4")
+    assert left([], columns(variant, {}, X, 0.0 * X), target) < 0.02
+
+
+K = np.linspace(0.0, 1.0, 201)
+
+
+@pytest.mark.parametrize("at", [0.04, 0.1, 0.3, 0.7])
+@pytest.mark.parametrize(
+    "share", [lambda y: y / (1.0 + y), np.tanh, lambda y: np.minimum(y, 1.0), lambda y: y + y**3]
+)
+def test_bundles_side_by_side_are_near_any_bending(at, share):
+    """Beside a stiffness that is left once all have slipped, a tenth of that at rest."""
+    variant = named(CANTILEVER_EFFECTS, "nonlinear_bending", "bundles side by side")
+    (scale,) = variant.shapes
+    names = tuple(p.name for p in variant.parameters)
+    bending = Marched(("kappa",), names)
+    bending.define({"moment": variant.moment(bending.at, bending.at["kappa"])}, {})
+    kappa = {"kappa": Varying(K[:, None])}
+
+    def moments(s):
+        slopes = bending(kappa, dict.fromkeys(names, 1.0) | {scale.name: s})["moment"].slopes
+        return [slopes[p.name][:, 0] for p in variant.amplitudes]
+
+    target = share(K / at) + 0.1 * K / at
+    best = min(
+        left([K, *moments(s)], [], target) for s in np.geomspace(scale.lower, scale.upper, 25)
+    )
+    assert best < 0.02
+
+
+def test_a_soft_gap_becomes_every_gap_and_none():
+    variant = named(PICTURE_FRAME_EFFECTS, "crosshead_backlash", "soft gap")
+    D = np.linspace(-1.0, 1.0, 81)
+
+    def travel(out, back, width):
+        names = ("free_travel_out_mm", "free_travel_back_mm", "gap_rounding_mm")
+        p = dict(zip(names, (out, back, width), strict=True))
+        return np.array([evaluated(variant.travel(p, as_ufl(float(d)), None)) for d in D])
+
+    for width in (1e-4, 0.05):
+        assert travel(0.0, 0.0, width) == pytest.approx(D, abs=1e-14)
+    for out, back in ((0.2, 0.2), (0.2, 0.0), (0.0, 0.1)):
+        gap = np.maximum(D - out, 0.0) + np.minimum(D + back, 0.0)
+        # A rounded corner is off by its width times ln 2, the start likewise.
+        assert travel(out, back, 1e-4) == pytest.approx(gap, abs=2.001e-4 * np.log(2.0))
+        soft = travel(out, back, 0.03)
+        assert soft[40] == 0.0 and (np.diff(soft) > 0.0).all()
+
+
+def test_what_laws_share_is_fitted_once():
+    variant = named(PICTURE_FRAME_EFFECTS, "crossover_relaxation", "spectrum, cubic")
+    names = [p.name for p in variant.parameters]
+    assert len(names) == len(set(names)) == 5
+    laws = variant.laws(dict.fromkeys(names, 2.0))
+    assert [law.relaxation_time for law in laws] == [2.0, 8.0, 32.0]
+    assert [law.cubic for law in laws] == [2.0, 2.0, 2.0]
+
+
+def test_signs_of_general_forms_are_those_of_physics():
+    """No negative friction, branch, dashpot, locking or slip; nor is any locking a spring."""
+    for effect in (*PICTURE_FRAME_EFFECTS, *CANTILEVER_EFFECTS):
+        for variant in effect.variants:
+            assert len(variant.parameters) <= 5
+            if len(variant.amplitudes) > 1 and effect.name not in (
+                "tension_coupling",
+                "load_drift",
+            ):
+                assert all(p.one_sided for p in variant.amplitudes)
+    for one in Locking.forms:
+        angles = [
+            n.parameter if isinstance(n, Times) else n for i in one.instances for n in [i["angle"]]
+        ]
+        assert all(p.lower >= 1 / 3 and p.share_of == "angle" for p in angles)
