@@ -31,6 +31,9 @@ class Readings:
         covariates: what the residual is shown against, by name with unit, each (n,).
         row: of each in its file, from 0, (n,), where readings of a run stand in another order; None
             where they do not.
+        model_error: of the model itself, alike at readings near each other, in the unit of the
+            readings: Σ_j b_j ξ_j with the columns b_j, (n, m), and independent ξ_j ~ N(0, 1),
+            beside the noise; None where the model is taken to be exact.
     """
 
     observed: Array
@@ -41,6 +44,7 @@ class Readings:
     names: tuple[str, ...]
     covariates: Mapping[str, Array]
     row: npt.NDArray[np.int64] | None = None
+    model_error: Array | None = None
 
     @property
     def fit(self) -> Flags:
