@@ -41,6 +41,31 @@ def synthesise(
             "case's, ten times and three times that",
         ),
     ] = None,
+    cells: Annotated[
+        int | None,
+        typer.Option(
+            "--cells",
+            metavar="N",
+            min=1,
+            help="Of a drape, between two crossings; default: as in a diagnosis.",
+        ),
+    ] = None,
+    spacing: Annotated[
+        float | None,
+        typer.Option(
+            "--spacing",
+            metavar="MM",
+            help="Of a drape's tows, the same fabric; default: the case's.",
+        ),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            "--model",
+            metavar="elements|kinematic",
+            help="Of a drape; a kinematic net knows offset and rotation only.",
+        ),
+    ] = None,
     readings: Annotated[int, typer.Option("--readings", min=10, help="Of each run.")] = 200,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the noise.")] = 0,
     effects_from: Annotated[
@@ -75,7 +100,12 @@ def synthesise(
                 folder,
                 effect or [],
                 noise,
-                _numbers(rates),
+                {
+                    "rates": _numbers(rates) or None,
+                    "cells": cells,
+                    "spacing": spacing,
+                    "model": model,
+                },
                 readings,
                 seed,
                 effects_from,
@@ -97,7 +127,7 @@ def _write(
     folder: Path,
     effects: list[str],
     noise: float,
-    rates: list[float],
+    of_kind: dict[str, Any],
     readings: int,
     seed: int,
     effects_from: Path | None,
@@ -117,7 +147,7 @@ def _write(
         readings=readings,
         own=own,
         place=str(path),
-        **({"rates": rates} if rates else {}),
+        **{name: value for name, value in of_kind.items() if value is not None},
     )
     try:
         loop.write_measurement(folder, made)

@@ -46,7 +46,7 @@ DRAPE_EFFECTS = (
                     ),
                 ),
                 changes=lambda mu: {"contact.friction": mu},
-                solved_at=(0.1, 0.2, 0.4, 0.8),
+                solved_at=(0.1, 0.4, 0.8),
             ),
         ),
     ),
