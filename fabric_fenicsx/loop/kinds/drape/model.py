@@ -253,6 +253,11 @@ class Drape:
         return np.hstack(blocks)
 
     @property
+    def model_std(self) -> Array:
+        """One sigma of all that the model itself may be wrong by [degrees], (n,)."""
+        return np.hypot(self.model_scatter, np.linalg.norm(self.model_error, axis=1))
+
+    @property
     def notes(self) -> list[str]:
         """What a report must say of the model."""
         law = self._shear
