@@ -11,6 +11,7 @@ import typer
 from ..errors import InputError
 from ..parallel import from_root
 from .collective import collective
+from .options import Settings
 
 if TYPE_CHECKING:
     from ..loop.synthesise import Case, Hidden
@@ -23,6 +24,7 @@ def synthesise(
     noise: Annotated[
         float, typer.Option("--noise", metavar="X", help="One sigma of a reading [N, mm, °].")
     ],
+    settings: Settings = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(
@@ -88,7 +90,7 @@ def synthesise(
     def action(comm: Any) -> int:
         from ..rigs.load import load_case
 
-        loaded = from_root(comm, lambda: load_case(case))
+        loaded = from_root(comm, lambda: load_case(case, settings or []))
         if comm.size > 1:
             # It starts up in all processes at once, and rank 0 alone will need it.
             import_module("petsc4py.PETSc")
