@@ -72,7 +72,7 @@ def points_table(drape: ff.Drape, d: Any) -> list[str]:
     readings = drape.readings
     steepness = steepness_of(drape)
     lines = [
-        "| point | x, y | measured | model | measured − model | model's scatter | change per mm |",
+        "| point | x, y | measured | model | measured − model | model's error | change per mm |",
         "|---|---|---|---|---|---|---|",
     ]
     x, y = readings.covariates["x [mm]"], readings.covariates["y [mm]"]
@@ -82,7 +82,7 @@ def points_table(drape: ff.Drape, d: Any) -> list[str]:
         lines.append(
             f"| {readings.row[i] + 1} | {x[i]:g}, {y[i]:g} mm | {measured} | "
             f"{d.baseline.expected[i]:.1f} | {d.baseline.residual[i]:+.1f} | "
-            f"{drape.model_scatter[i]:.1f} | {steepness[i]:.2f} |"
+            f"{drape.model_std[i]:.1f} | {steepness[i]:.2f} |"
         )
     return lines
 
@@ -111,11 +111,11 @@ def conclusions(drape: ff.Drape, d: Any) -> list[str]:
     """What the numbers allow to say."""
     n = len(drape.readings.observed)
     rms = float(np.sqrt(np.mean(d.baseline.residual**2)))
-    scatter = float(np.sqrt(np.mean(drape.model_scatter**2)))
+    scatter = float(np.sqrt(np.mean(drape.model_std**2)))
     likely = [c.effect.name for c in d.candidates if c.p_value < 0.05]
     rivals = {name for own in d.rivals.values() for name in own}
     text = [
-        f"- The model misses the {n} angles by {rms:.1f}° rms. Its own scatter at these places is "
+        f"- The model misses the {n} angles by {rms:.1f}° rms. Its own error at these places is "
         f"{scatter:.1f}°, the measurement's {drape.noise:.1f}°.",
         f"- Effects that chance alone would favour as much in fewer than one of twenty such "
         f"tables: {', '.join(likely) or 'none'}.",
@@ -147,7 +147,7 @@ def page(drape: ff.Drape, d: Any, report: dict[str, Any]) -> str:
         f"> {report['headline']}",
         "",
         "Errors in the headline are weighted: a reading counts by its standard deviation and the",
-        "model's own scatter together. Without holdout runs the held-out error is of each reading",
+        "model's waves together. Without holdout runs the held-out error is of each reading",
         "predicted from the others.",
         "",
         "## The readings",

@@ -11,6 +11,7 @@ import typer
 from ..errors import InputError
 from ..parallel import from_root
 from .collective import collective
+from .options import Settings
 
 if TYPE_CHECKING:
     from ..loop.synthesise import Case, Hidden
@@ -23,6 +24,7 @@ def synthesise(
     noise: Annotated[
         float, typer.Option("--noise", metavar="X", help="One sigma of a reading [N, mm, °].")
     ],
+    settings: Settings = None,
     effect: Annotated[
         list[str] | None,
         typer.Option(
@@ -39,6 +41,31 @@ def synthesise(
             metavar="X,X",
             help="Of the crosshead [mm/min], a run for each, the last one held out; default: the "
             "case's, ten times and three times that",
+        ),
+    ] = None,
+    cells: Annotated[
+        int | None,
+        typer.Option(
+            "--cells",
+            metavar="N",
+            min=1,
+            help="Of a drape, between two crossings; default: as in a diagnosis.",
+        ),
+    ] = None,
+    spacing: Annotated[
+        float | None,
+        typer.Option(
+            "--spacing",
+            metavar="MM",
+            help="Of a drape's tows, the same fabric; default: the case's.",
+        ),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            "--model",
+            metavar="elements|kinematic",
+            help="Of a drape; a kinematic net knows offset and rotation only.",
         ),
     ] = None,
     readings: Annotated[int, typer.Option("--readings", min=10, help="Of each run.")] = 200,
@@ -63,7 +90,7 @@ def synthesise(
     def action(comm: Any) -> int:
         from ..rigs.load import load_case
 
-        loaded = from_root(comm, lambda: load_case(case))
+        loaded = from_root(comm, lambda: load_case(case, settings or []))
         if comm.size > 1:
             # It starts up in all processes at once, and rank 0 alone will need it.
             import_module("petsc4py.PETSc")
@@ -75,7 +102,12 @@ def synthesise(
                 folder,
                 effect or [],
                 noise,
-                _numbers(rates),
+                {
+                    "rates": _numbers(rates) or None,
+                    "cells": cells,
+                    "spacing": spacing,
+                    "model": model,
+                },
                 readings,
                 seed,
                 effects_from,
@@ -97,7 +129,7 @@ def _write(
     folder: Path,
     effects: list[str],
     noise: float,
-    rates: list[float],
+    of_kind: dict[str, Any],
     readings: int,
     seed: int,
     effects_from: Path | None,
@@ -117,7 +149,7 @@ def _write(
         readings=readings,
         own=own,
         place=str(path),
-        **({"rates": rates} if rates else {}),
+        **{name: value for name, value in of_kind.items() if value is not None},
     )
     try:
         loop.write_measurement(folder, made)

@@ -43,8 +43,9 @@ class Readings:
             along it noise may be correlated.
         row: of each in its file, from 0, (n,), where readings of a run stand in another order; None
             where they do not.
-        model_error: columns b_j, (n, m), of what the model itself is uncertain by: Σ b_j ξ_j with
-            independent ξ_j of variance one; None where that is nothing.
+        model_error: of the model itself, alike at readings near each other, in the unit of the
+            readings: Σ_j b_j ξ_j with the columns b_j, (n, m), and independent ξ_j ~ N(0, 1),
+            beside the noise; None where the model is taken to be exact.
     """
 
     observed: Array

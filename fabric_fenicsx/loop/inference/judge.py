@@ -55,11 +55,13 @@ class Misfit:
     Attributes:
         variances: components with a smooth line through each run allowed for: the noise is what
             is left of readings next to each other.
-        noise: root mean square of that over the fitted readings.
+        reading: root mean square of that over the fitted readings.
+        noise: that and the model's own error, where it is known to have one: what is printed.
         whiteness: tests of what the model leaves.
     """
 
     variances: Variances
+    reading: float
     noise: float
     whiteness: Whiteness
 
@@ -168,7 +170,10 @@ class Judge:
                 rows,
                 chance_of_no_misfit(lined, model.estimate),
             )
-            self._misfits[model.fit] = Misfit(lined.variances, noise, white)
+            error = self._readings.model_error
+            own_error = 0.0 if error is None else np.sqrt(np.mean(np.sum(error[rows] ** 2, axis=1)))
+            printed = float(np.hypot(noise, own_error))
+            self._misfits[model.fit] = Misfit(lined.variances, noise, printed, white)
         return self._misfits[model.fit]
 
     def fits(self, model: Model, baseline: Model) -> bool:
@@ -204,7 +209,7 @@ class Judge:
             count = int(model.fit.used.sum())
         noise = model.fit.variances.noise.typical(self._readings, model.fit.used)
         limit = max(CRITERIA.scatter, self._by_chance(model, count))
-        return bool(error * noise <= limit * max(self.misfit(model).noise, 0.0))
+        return bool(error * noise <= limit * self.misfit(model).reading)
 
     def settled(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise alone, or so little else that nothing can be made of it."""

@@ -147,7 +147,7 @@ class _Search:
             experiment=self.experiment,
             verdict=verdict,
             noise=misfit.noise,
-            noise_source=self._noise_source(misfit.noise),
+            noise_source=self._noise_source(misfit.reading),
             noise_model=judged.estimate.variances.noise,
             quantum=quantum(self.experiment.readings, self.judge.rows),
             baseline=baseline.fit,
@@ -369,10 +369,14 @@ class _Search:
     def _noise_source(self, noise: float) -> str:
         given = self.judge.given
         if given is None:
-            return "estimated from what readings next to each other differ by"
-        if noise == given:
-            return "given"
-        return f"estimated, as readings scatter by other than the {given:.3g} that is stated"
+            source = "estimated from what readings next to each other differ by"
+        elif noise == given:
+            source = "given"
+        else:
+            source = f"estimated, as readings scatter by other than the {given:.3g} that is stated"
+        if self.experiment.readings.model_error is not None:
+            source += f": {noise:.3g}; and the model's own error"
+        return source
 
     def _notes(self, chosen: Fit, baseline: Fit) -> list[str]:
         """What a reader has to know of how the reported model was come by."""

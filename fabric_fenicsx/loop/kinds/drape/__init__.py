@@ -73,7 +73,7 @@ DRAPE = Kind(
     mistakes=_mistakes,
     experiment=called_later(f"{__name__}.model", "Drape"),
     made_up=called_later(f"{__name__}.made_up", "made_up"),
-    options=("solve",),
+    options=("cells", "spacing", "model", "solve"),
     further_tests={
         ("holder_pressure", "tool_friction"): FORCES,
         ("holder_pressure", "ply_rotation"): FORCES,

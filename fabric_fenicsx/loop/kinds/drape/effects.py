@@ -2,10 +2,14 @@
 
 Those of place cost no further solution: the tools are bodies of revolution, so that the sheet that
 was moved or turned under them has the aligned sheet's angles in other places. That is exact for a
-turn. For an offset the sheet must be large and something must hold it: of a run of the whole demo
-with the punch at (6, −4) mm and friction 0.1 the best shift is (5.7, −4.2) mm, 1.0° rms away;
-without any friction the best shift is (11.8, −5.4) mm, 2.4° rms away: probably the sheet, held by
-nothing, slides as it is drawn. An offset found on oiled tools may be up to twice the one there is.
+turn. For an offset the sheet must be large and something must hold it: of a run of the whole sheet
+with the punch at (8, −6) mm and friction 0.1 the best shift is (8.2, −6.2) mm, 0.4° rms away;
+without any friction the best shift is (2.5, −8.1) mm, 0.7° rms away: the sheet, held by nothing,
+slides as it is drawn. An offset found on oiled tools may be as wrong as that.
+
+Friction on all tools and a pushed holder pull at the same tows: their changes of the angles have a
+cosine of 0.98 or more, with the model's own error as a metric too. One may stand for the other, and
+angles at one force of the holder do not tell which it is.
 """
 
 from __future__ import annotations
@@ -19,7 +23,8 @@ from .variant import DrapeVariant
 
 __all__ = ["DRAPE_EFFECTS", "HOLDER_FRICTION"]
 
-#: μ on die and holder that goes with a force of the holder. Only their product is felt.
+#: μ on die and holder that goes with a force of the holder. Only their product is felt: 200 N at
+#: twice this friction and 400 N at this have angles within 0.05° rms of each other.
 HOLDER_FRICTION = 0.2
 
 
@@ -46,7 +51,8 @@ DRAPE_EFFECTS = (
                     ),
                 ),
                 changes=lambda mu: {"contact.friction": mu},
-                solved_at=(0.1, 0.2, 0.4, 0.8),
+                # In between the angles are within 0.01°; of the forces below within 0.03°.
+                solved_at=(0.1, 0.4, 0.8),
             ),
         ),
     ),

@@ -10,16 +10,28 @@ from typing import Any
 import numpy as np
 
 from ....errors import InputError
+from ....inputs.keys import one_of
 from ....rigs.common import section
 from ....rigs.drape import DrapeCase
+from ....rigs.levels import same_fabric
 from ...inference.effects import Effect
 from ...measurement.kind import MadeUp
 from ...measurement.schema import Measurement, Run, fabric_keys
 from . import DrapeRig
 from .model import Drape
-from .shear_field import ShearLaw, Solve, drape_case, solved_field
+from .shear_field import (
+    ShearField,
+    ShearLaw,
+    Solve,
+    drape_case,
+    kinematic_field,
+    solved_field,
+)
+from .variant import DrapeVariant
 
 __all__ = ["made_up"]
+
+MODELS = ("elements", "kinematic")
 
 
 def made_up(
@@ -30,12 +42,17 @@ def made_up(
     seed: int,
     own: Sequence[Effect],
     *,
+    cells: int | None = None,
+    spacing: float | None = None,
+    model: str = MODELS[0],
     solve: Solve = solved_field,
 ) -> MadeUp:
     """Places anywhere within the outer tows, the last quarter of them held out.
 
-    They are read in the filtered field of the drape's model: without the waves of two tow spacings
-    that a diagnosis leaves out as well, so that such a trial is kinder than a measured drape.
+    They are read in the filtered field of a model: without the waves of two tow spacings that a
+    diagnosis leaves out as well. By default it is the very model of a diagnosis, so that such a
+    trial is kinder than a measured drape; with other cells, another spacing or a kinematic net it
+    is not.
 
     Args:
         case: of the drape; its laws are those of the experiment.
@@ -44,11 +61,17 @@ def made_up(
         readings: in all.
         seed: of the places.
         own: effects of the user's.
+        cells: between two crossings, other than those of a diagnosis.
+        spacing: of the tows that make up the same fabric, or of a kinematic net's own [mm], other
+            than the case's.
+        model: "elements", or "kinematic": a net without mechanics, which knows effects of place.
         solve: from a case to its field; the finite elements.
 
     Raises:
-        InputError: the case has something that a measurement of a drape cannot say.
+        InputError: the case has something that a measurement of a drape cannot say, or there is no
+            such mesh or model.
     """
+    solve = _by_another(case, cells, spacing, model, solve)
     sheet = case.sheet
     rig = DrapeRig(
         fabric_size_mm=sheet.width_mm,
@@ -67,8 +90,10 @@ def made_up(
     law = case.crossover
     shear = ShearLaw(law.k1_N_mm, law.k3_N_mm, law.dashpot_N_s_mm)
     experiment = Drape(
-        [measurement], own, shear=shear, C1=fabric.tow.C1_MPa, source=place, solve=solve
+        [measurement], own, shear=shear, C1=fabric.tow.C1_MPa, source=place, solve=solve, exact=True
     )
+    if model == "kinematic":
+        experiment.effects = [e for e in experiment.effects if _of_place(e)]
     again = drape_case(measurement, shear, fabric.tow.C1_MPa)
     for name, value in case.model_dump().items():
         if name == "tow":
@@ -82,6 +107,38 @@ def made_up(
                 "put effects in as --effect"
             )
     return MadeUp(measurement, experiment, {}, 1, 3.0)
+
+
+def _by_another(
+    case: DrapeCase, cells: int | None, spacing: float | None, model: str, solve: Solve
+) -> Solve:
+    """Solve with another mesh, or by another model."""
+    if model not in MODELS:
+        raise InputError(f"--model: {model!r}, allowed is {one_of(MODELS)}")
+    if model == "kinematic":
+        if cells is not None:
+            raise InputError("--cells: not allowed with --model kinematic, a net without cells")
+        return lambda asked: kinematic_field(asked, spacing)
+    sheet = case.sheet
+    own, widest = sheet.warp_spacing_mm, sheet.width_mm / 4.0
+    factor = 1.0 if spacing is None else spacing / own
+    if not 0.0 < factor * own <= widest:
+        raise InputError(
+            f"--spacing: {spacing:g}, allowed is more than 0 and at most a quarter of the sheet's "
+            f"width, {widest:g} mm"
+        )
+
+    def solved(asked: DrapeCase) -> ShearField:
+        again = same_fabric(asked, factor)
+        mesh = {} if cells is None else {"subdivisions": cells}
+        return solve(again.model_copy(update={"sheet": again.sheet.model_copy(update=mesh)}))
+
+    return solved
+
+
+def _of_place(effect: Effect) -> bool:
+    """Whether it only moves the pattern, in all its forms."""
+    return all(isinstance(v, DrapeVariant) and v.changes is None for v in effect.variants)
 
 
 def _same_tows(one: DrapeCase, other: DrapeCase) -> bool:

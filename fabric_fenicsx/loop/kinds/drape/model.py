@@ -11,8 +11,8 @@ piecewise cubic Hermite interpolation. Effects that change the case add up, to f
 
 In a flange without friction the virtual tows wave in the plane from one crossing to the next. Such
 a wave, of two spacings, says nothing of the fabric: the spacing is a choice. It is taken out of the
-fields by Shapiro's filter of order two, which keeps cubics; see ``Drape.model_scatter`` for what is
-left of it.
+fields by Shapiro's filter of order two, which keeps cubics; ``Drape.model_scatter`` is its size.
+What else the model is wrong by is alike at neighbouring places: ``Drape.model_error``.
 """
 
 from __future__ import annotations
@@ -36,15 +36,25 @@ from ...inference.noise import estimated_noise
 from ...measurement.readings import readings_of
 from ...measurement.schema import Measurement
 from .effects import DRAPE_EFFECTS
-from .shear_field import ShearField, ShearLaw, Solve, drape_case, hermite_weights, solved_field
+from .model_error import OTHER_MESH, error_of
+from .shear_field import (
+    Net,
+    ShearField,
+    ShearLaw,
+    Solve,
+    drape_case,
+    hermite_weights,
+    kinematic_field,
+    solved_field,
+)
 from .variant import DrapeVariant
 
 __all__ = ["Drape"]
 
 Array = npt.NDArray[np.float64]
 
-#: Cells between two crossings: of all fields, and of the one that shows what depends on it.
-MESH, OTHER_MESH = 2, 3
+#: Cells between two crossings.
+MESH = 2
 #: Above this [degrees] a reading is no scatter about a right angle: all are made acute.
 OBTUSE = 100.0
 
@@ -69,6 +79,8 @@ class Drape:
         C1: Neo-Hookean constant of the tows [MPa]; by default each measurement's own.
         source: where these come from, for the report.
         solve: from a case to its field; the finite elements.
+        net: from a case to the field of a kinematic net, for the model's own error; None for none.
+        exact: the model has no error of its own, as where it makes up a measurement.
     """
 
     test = "drape"
@@ -85,10 +97,12 @@ class Drape:
         C1: float | None = None,
         source: str = "",
         solve: Solve = solved_field,
+        net: Net | None = kinematic_field,
+        exact: bool = False,
     ) -> None:
         self.measurements = list(measurements)
         self.effects = [*DRAPE_EFFECTS, *own]
-        self._solve = solve
+        self._solve, self._net, self._exact = solve, net, exact
         self._fields: dict[str, ShearField] = {}
         self._filtered: dict[str, ShearField] = {}
         self._unsolved: dict[tuple[str, float], str] = {}
@@ -171,7 +185,7 @@ class Drape:
 
     @cached_property
     def readings(self) -> Readings:
-        """The data. The first call solves the baseline on two meshes.
+        """The data. The first call solves the baseline and what tells its error.
 
         Raises:
             SolveError: a drape stopped before its end.
@@ -197,36 +211,55 @@ class Drape:
             residual = angle - self.predict((), {})[0]
             noise = estimated_noise(residual, readings, readings.fit)
             sigma = np.where(np.isnan(sigma), noise, sigma)
+        if self._exact:
+            return replace(readings, weight=noise / sigma)
         weight = noise / np.hypot(sigma, self.model_scatter)
-        return replace(readings, weight=weight)
+        return replace(readings, weight=weight, model_error=self.model_error)
 
     @cached_property
     def model_scatter(self) -> Array:
-        """By how much the model itself is uncertain at each reading [degrees], (n,).
+        """Waves of two spacings that are filtered out, one sigma at each reading [degrees], (n,).
 
-        Two meshes of the baseline, with their waves of two spacings, scatter about the filtered
-        field of the first: the root mean square of that over the crossings around a place. Its
-        square is added to the variance of a reading, so that a place about which the model has
-        nothing certain to say does not decide.
-
-        That is less than a treatment of model error: such errors are alike at neighbouring places
-        and do not average out with many readings, so that standard errors and p-values are still
-        too small; and what both meshes have in common (the fabric's laws, the size of the sheet,
-        the spacing) they cannot show.
+        The root mean square over two meshes and the crossings around a place. Its square is added
+        to the variance of a reading, so that a place where the spacing decides does not.
         """
         scatter = np.zeros(len(self.sigma))
         for sheet in self._sheets:
-            fine = {"sheet.subdivisions": OTHER_MESH}
-            mean = self._field(sheet.measurement, {}).gamma
-            raw = [self._raw(sheet.measurement, changes) for changes in ({}, fine)]
+            raw = [
+                self._raw(self._case(sheet.measurement, {"sheet.subdivisions": cells}))
+                for cells in (MESH, OTHER_MESH)
+            ]
             # The sign of γ changes across the axes: compared is what is read.
-            off = [np.degrees(np.abs(f.gamma) - np.abs(mean)) for f in raw]
+            off = [np.degrees(np.abs(f.gamma) - np.abs(f.filtered().gamma)) for f in raw]
             square = gaussian_filter(np.mean(np.square(off), axis=0), 1.0, mode="nearest")
             # Linear between crossings: a square must not overshoot below zero.
             x, y = raw[0].x, raw[0].y
             places = np.column_stack([np.clip(sheet.x, x[0], x[-1]), np.clip(sheet.y, y[0], y[-1])])
             scatter[sheet.rows] = np.sqrt(RegularGridInterpolator((x, y), square)(places))
         return scatter
+
+    @cached_property
+    def model_error(self) -> Array:
+        """Columns of the model's own error [degrees], (n, m); see ``Readings.model_error``.
+
+        Sheets of one rig and fabric have them in common.
+        """
+        alike: dict[str, tuple[DrapeCase, list[_Sheet]]] = {}
+        for sheet in self._sheets:
+            case = self._case(sheet.measurement, {})
+            alike.setdefault(case.model_dump_json(), (case, []))[1].append(sheet)
+        blocks = []
+        for case, sheets in alike.values():
+            error = error_of(case, self._raw, self._net)
+            blocks.append(np.zeros((len(self.sigma), error.count)))
+            for sheet in sheets:
+                blocks[-1][sheet.rows] = error.columns(sheet.x, sheet.y)
+        return np.hstack(blocks)
+
+    @property
+    def model_std(self) -> Array:
+        """One sigma of all that the model itself may be wrong by [degrees], (n,)."""
+        return np.hypot(self.model_scatter, np.linalg.norm(self.model_error, axis=1))
 
     @property
     def notes(self) -> list[str]:
@@ -235,13 +268,15 @@ class Drape:
         tows = {m.fabric.tow.C1_MPa if self._C1 is None else self._C1 for m in self.measurements}
         C1 = ", ".join(f"{value:.6g}" for value in sorted(tows))
         scatter = float(np.sqrt(np.mean(self.model_scatter**2)))
+        error = float(np.sqrt(np.mean(np.sum(self.model_error**2, axis=1))))
         return [
             f"Shear law m = {law.k1:.4g} γ + {law.k3:.4g} γ³ + {law.c1:.4g} dγ/dt N/mm "
             f"({self._shear_source}).",
             f"C1 = {C1} MPa ({self._C1_source}).",
-            f"The model's own scatter, from two meshes, is {scatter:.2g} degrees rms at these "
-            "places. Readings are weighted with it and errors are weighted errors: one as large "
-            "as the noise means a misfit of noise and model scatter together.",
+            f"The model's own error is {error:.2g} degrees rms at these places, alike at places "
+            "near each other: from other cells, another spacing of the tows, harder contact and a "
+            f"kinematic net. Waves of two spacings, {scatter:.2g} degrees rms, are filtered out "
+            "and added to the scatter of a reading.",
             *(
                 f"{part} was fitted to the picture frame: negative, so that 0 is taken here."
                 for part in self._clipped
@@ -368,14 +403,14 @@ class Drape:
                 return found
 
     def _field(self, m: Measurement, changes: Mapping[str, Any]) -> ShearField:
-        key = self._case(m, changes).model_dump_json()
+        case = self._case(m, changes)
+        key = case.model_dump_json()
         if key not in self._filtered:
-            self._filtered[key] = self._raw(m, changes).filtered()
+            self._filtered[key] = self._raw(case).filtered()
         return self._filtered[key]
 
-    def _raw(self, m: Measurement, changes: Mapping[str, Any]) -> ShearField:
-        """The field of a changed case, solved once."""
-        case = self._case(m, changes)
+    def _raw(self, case: DrapeCase) -> ShearField:
+        """The field of a case, solved once."""
         key = case.model_dump_json()
         if key not in self._fields:
             self._fields[key] = self._solve(case)

@@ -19,10 +19,20 @@ from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
 from ....errors import InputError, SolveError
 from ....rigs.common import Session, control
 from ....rigs.drape import DrapeCase, build
+from ....rigs.kinematic import kinematic_net
 from ....rigs.simulation import simulate
 from ...measurement.schema import FILE, Measurement
 
-__all__ = ["ShearField", "ShearLaw", "Solve", "drape_case", "hermite_weights", "solved_field"]
+__all__ = [
+    "Net",
+    "ShearField",
+    "ShearLaw",
+    "Solve",
+    "drape_case",
+    "hermite_weights",
+    "kinematic_field",
+    "solved_field",
+]
 
 Array = npt.NDArray[np.float64]
 
@@ -98,6 +108,11 @@ class ShearField:
 
 
 Solve = Callable[[DrapeCase], ShearField]
+Net = Callable[[DrapeCase, float | None], ShearField]
+"""From a case and the spacing of a kinematic net's own tows [mm] to its field."""
+
+#: A kinematic net's sheet over the case's: nothing of it depends on where the sheet ends.
+BEYOND = 1.5
 
 
 def drape_case(
@@ -188,6 +203,24 @@ def solved_field(case: DrapeCase) -> ShearField:
         raise SolveError(f"the drape stopped before its end: {outcome.stop}")
     places = model.net.points[model.net.crossings].mean(axis=1)[:, :2]
     return ShearField.of_quarter(places, outcome.last.shear_angle)
+
+
+def kinematic_field(case: DrapeCase, spacing: float | None = None) -> ShearField:
+    """Shear angles of the kinematic net over the tools, some way beyond the sheet's edges too.
+
+    Args:
+        case: of a drape; only its shapes matter.
+        spacing: of the net's own tows [mm], see ``rigs.kinematic.kinematic_net``.
+
+    Raises:
+        InputError: there is no such net, or it ends on the sheet.
+    """
+    sides = {name: BEYOND * getattr(case.sheet, name) for name in ("width_mm", "length_mm")}
+    larger = case.model_copy(update={"sheet": case.sheet.model_copy(update=sides)})
+    net = kinematic_net(larger, spacing=spacing)
+    if net.ended.any():
+        raise InputError(f"punch_travel_mm: {case.punch_travel_mm:g}: the kinematic net ends")
+    return ShearField(net.u, net.v, net.shear)
 
 
 def hermite_weights(
