@@ -14,6 +14,7 @@ from ...inputs.groups import Keys
 from ...inputs.tables import Column
 from ..inference.effects import Effect
 from ..inference.experiment import Experiment
+from .proposal import Proposal
 from .schema import Measurement
 
 __all__ = ["Kind", "MadeUp", "Mistake", "called_later"]
@@ -69,6 +70,7 @@ class Kind:
             what messages call it, the noise, the readings of a run, the seed, a user's own
             effects, and its ``options`` by name. None: there is no such trial.
         options: what only this kind's ``made_up`` takes by name.
+        proposals: from measurements of this kind to runs that its rig could do next.
         further_tests: what to measure to tell two effects apart, by their names.
         needs_others: its model takes what was fitted to kinds before it (``Experiment.take``).
         scattered: readings lie all over a sheet, on no line.
@@ -87,6 +89,7 @@ class Kind:
     )
     made_up: Callable[..., MadeUp] | None = None
     options: tuple[str, ...] = ()
+    proposals: Callable[[Sequence[Measurement]], list[Proposal]] = lambda measurements: []
     further_tests: Mapping[tuple[str, str], str] = field(default_factory=dict)
     needs_others: bool = False
     scattered: bool = False

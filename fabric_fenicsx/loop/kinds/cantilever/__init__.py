@@ -22,6 +22,9 @@ class CantileverRig(Keys):
 
     width_mm: Positive = Field(description="of the specimens")
     gravity_mm_s2: Positive = Field(9810.0, description="downwards")
+    upside_down: bool = Field(
+        False, description="strips turned over in their clamp, against those of other folders"
+    )
 
 
 def _mistakes(rig: CantileverRig, columns: Mapping[str, Array]) -> Iterator[Mistake]:
@@ -50,6 +53,7 @@ CANTILEVER = Kind(
     mistakes=_mistakes,
     experiment=called_later(f"{__name__}.model", "Cantilever"),
     made_up=called_later(f"{__name__}.made_up", "made_up"),
+    proposals=called_later(f"{__name__}.proposals", "proposals"),
     further_tests={
         ("clamp_compliance", "clamp_tilt"): (
             LENGTHS

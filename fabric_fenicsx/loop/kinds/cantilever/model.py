@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -61,6 +62,7 @@ class _Specimen:
         tow: its model.
         rows: places of the readings, (n,).
         s, x, z: of the readings [mm], (n,); s is NaN where it is not known.
+        upside_down: whether it was turned over in its clamp.
     """
 
     tow: HangingTow
@@ -68,6 +70,7 @@ class _Specimen:
     s: Array
     x: Array
     z: Array
+    upside_down: bool
 
 
 class Cantilever:
@@ -92,7 +95,7 @@ class Cantilever:
     def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
         self.noise = common_noise(measurements)
         self._lay_out(measurements)
-        self._compiled: dict[tuple[StripVariant, str], Marched] = {}
+        self._compiled: dict[tuple[StripVariant, str, bool], Marched] = {}
         slope, self.scatter = self._measured_slopes()
         unknown = np.isnan(self._arc)
         self._steepness = np.where(unknown, np.minimum(np.abs(np.tan(slope)), STEEPEST), 0.0)
@@ -120,10 +123,10 @@ class Cantilever:
 
     def _lay_out(self, measurements: Sequence[Measurement]) -> None:
         """Readings in the order of runs, in a run by length and along the strip."""
-        tows: dict[tuple[float, ...], HangingTow] = {}
+        tows: dict[tuple[Any, ...], HangingTow] = {}
         table: list[Array] = []
         run_of: list[npt.NDArray[np.int64]] = []
-        keys: list[tuple[float, ...]] = []
+        keys: list[tuple[Any, ...]] = []
         number = 0
         for m in measurements:
             tow, spacing = m.fabric.tow, m.fabric.tow_spacing_mm
@@ -138,17 +141,18 @@ class Cantilever:
                 run_of.append(np.full(run.count, number, dtype=np.int64))
                 number += 1
                 for length in columns[0]:
-                    key = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
+                    size = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
+                    key = (*size, m.rig.upside_down)
                     keys.append(key)
                     if key not in tows:
-                        tows[key] = HangingTow(*key)
+                        tows[key] = HangingTow(*size)
         self._length, self._arc, x, self._observed = np.concatenate(table, axis=1)
         self._run = np.concatenate(run_of)
         self._specimens = []
         for own, tow_model in tows.items():
             rows = np.array([i for i, other in enumerate(keys) if other == own])
             self._specimens.append(
-                _Specimen(tow_model, rows, self._arc[rows], x[rows], self._observed[rows])
+                _Specimen(tow_model, rows, self._arc[rows], x[rows], self._observed[rows], own[-1])
             )
 
     # Start --------------------------------------------------------------------------------
@@ -219,12 +223,12 @@ class Cantilever:
     ) -> tuple[Array, dict[str, Array]]:
         """Heights [mm] and their derivatives; see Experiment."""
         mine = [v for v in variants if isinstance(v, StripVariant)]
-        laws = self._laws(mine)
+        laws = {turned: self._laws(mine, turned) for turned in (False, True)}
         names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
         expected = np.zeros(len(self._run))
         slopes = {name: np.zeros(len(self._run)) for name in names}
         for own in self._specimens:
-            shape = own.tow.solve(values, laws)
+            shape = own.tow.solve(values, laws[own.upside_down])
             heights, changes = self._heights(own, shape.x, shape.z, shape.slopes)
             expected[own.rows] = heights
             for name, change in changes.items():
@@ -238,8 +242,11 @@ class Cantilever:
             SolveError: the model has no solution there.
         """
         mine = [v for v in variants if isinstance(v, StripVariant)]
-        laws = self._laws(mine)
-        shapes = [own.tow.solve(values, laws, slopes=False) for own in self._specimens]
+        laws = self._laws(mine, False)
+        shapes = [
+            own.tow.solve(values, self._laws(mine, own.upside_down), slopes=False)
+            for own in self._specimens
+        ]
         kappa = np.linspace(0.0, max(float(np.abs(s.curvature).max()) for s in shapes), LAW_POINTS)
         per_C1 = self.stiffness_per_C1
         moment, slopes = values["C1_MPa"] * per_C1 * kappa, {"C1_MPa": per_C1 * kappa}
@@ -293,9 +300,10 @@ class Cantilever:
             at[free] = s
         return at
 
-    def _laws(self, variants: Sequence[StripVariant]) -> Laws:
+    def _laws(self, variants: Sequence[StripVariant], upside_down: bool) -> Laws:
         def those(result: str, of: str) -> list[Marched]:
-            return [self._law(v, result, of) for v in variants if getattr(v, result) is not None]
+            mine = (v for v in variants if getattr(v, result) is not None)
+            return [self._law(v, result, of, upside_down) for v in mine]
 
         return Laws(
             moments=those("moment", "kappa"),
@@ -303,13 +311,19 @@ class Cantilever:
             slopes=those("slope", "root"),
         )
 
-    def _law(self, variant: StripVariant, result: str, of: str) -> Marched:
-        """One of a variant's expressions, with its derivatives."""
-        key = (variant, result)
+    def _law(self, variant: StripVariant, result: str, of: str, upside_down: bool) -> Marched:
+        """One of a variant's expressions, with its derivatives.
+
+        What belongs to the strip turns over with it: m(κ) becomes -m(-κ) and κ0 becomes -κ0.
+        """
+        turned = upside_down and result != "slope"
+        key = (variant, result, turned)
         if key not in self._compiled:
             law = Marched((of,), ("B", *(p.name for p in variant.parameters)))
-            given = (law.at,) if result == "unloaded" else (law.at, law.at[of])
-            self._compiled[key] = law.define({result: getattr(variant, result)(*given)}, {})
+            sign = -1.0 if turned else 1.0
+            given = (law.at,) if result == "unloaded" else (law.at, sign * law.at[of])
+            expression = sign * getattr(variant, result)(*given)
+            self._compiled[key] = law.define({result: expression}, {})
         return self._compiled[key]
 
 

@@ -60,6 +60,7 @@ PICTURE_FRAME = Kind(
     mistakes=_mistakes,
     experiment=called_later(f"{__name__}.model", "PictureFrame"),
     made_up=called_later(f"{__name__}.made_up", "made_up"),
+    proposals=called_later(f"{__name__}.proposals", "proposals"),
     options=("rates",),
     further_tests={
         ("crossover_friction", "crosshead_backlash"): TURN + ", free travel only shifts the curve",

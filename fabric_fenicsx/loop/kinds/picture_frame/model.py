@@ -27,7 +27,7 @@ from ....mechanics.laws.law import Crossing
 from ....mechanics.laws.springs import PolynomialSpring
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, Variant, scaled
+from ...inference.effects import Effect, Variant, of_run, scaled
 from ...inference.noise import estimated_noise
 from ...measurement.readings import common_noise, readings_of
 from ...measurement.schema import Measurement
@@ -264,10 +264,8 @@ class PictureFrame:
         def expanded(v: Variant) -> Variant:
             if not (isinstance(v, FrameVariant) and v.each_run):
                 return v
-            own = ((p, int(run)) for run in runs for p in v.parameters)
-            return replace(
-                v, parameters=tuple(replace(p, name=_of_run(p, run), run=run) for p, run in own)
-            )
+            own = tuple(of_run(p, int(run)) for run in runs for p in v.parameters)
+            return replace(v, parameters=own)
 
         each = [v for v in effect.variants if getattr(v, "each_run", False)]
         shared = [v for v in effect.variants if v not in each]
@@ -312,11 +310,6 @@ class PictureFrame:
                 zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
                 total[:, run] = sum(z * c for z, c in zip(zero, own.values(), strict=True))
         return Varying(total, found)
-
-
-def _of_run(p: Parameter, run: int) -> str:
-    """Name of a parameter in one run, counted from 1."""
-    return f"run{run + 1}_{p.name}"
 
 
 def _remembered(marched: Marched, number: int, name: str) -> Any:

@@ -1,0 +1,203 @@
+"""Which further run would tell two models apart that fit the readings alike, and how well.
+
+Let A be true. Its parameters are known as well as the readings tell: they are drawn about its fit.
+A further run y, all but its noise, takes away from B, whatever B makes of its own parameters then,
+
+    D_B = min over θ of |y - y_B(θ)|²/σ² + |Y_B(θ) - Y_B(θ̂)|²/σ²
+
+Y_B the model at the readings there are, θ̂ its fit to them; to first order the second term is
+(θ - θ̂)ᵀ I_B (θ - θ̂), I_B their information on θ. A itself loses D_A, by the same formula. With
+s² = D_B - D_A the logarithm of the likelihood ratio of A to B, (χ²_B - χ²_A)/2, is all but
+Gaussian: the noise of y enters linearly, with the variance s², about the mean s²/2 where A is true
+and -s²/2 where B is. A test that rejects a true B in 5 % of the cases does so above
+-s²/2 + 1.645 s, and it rejects B where A is true with the power Φ(s - 1.645). All runs are ranked
+to first order; for the best of them the minimum is found, in the forms of the rival that come
+nearest. The harder of the two ways, A true and B true, counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import norm
+
+from ...errors import SolveError
+from ..measurement.kind import Kind
+from ..measurement.proposal import Proposal
+from ..measurement.schema import Measurement
+from .experiment import Experiment
+from .fitting import Fit
+from .foretold import Foretold, Known
+
+__all__ = ["NextTest", "best_tests", "next_tests", "next_tests_report"]
+
+Array = npt.NDArray[np.float64]
+
+#: Probability of rejecting a true model. Convention.
+LEVEL = 0.05
+#: Draws of the true model's parameters beside its fit, half of them opposite to the others.
+DRAWS = 8
+#: Proposals beyond those wanted, and forms of the rival, whose minimum is found at most.
+SPARE, FORMS = 2, 3
+#: A form is left out that to first order is this many times further away than the nearest one.
+FAR = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class NextTest:
+    """A further run that tells two effects apart.
+
+    Attributes:
+        effects: their names.
+        proposal: what to do.
+        separation: s, in units of the noise; the median over what is not known of the true model.
+        power: probability that the wrong effect is rejected at 5 %; the mean over that.
+    """
+
+    effects: tuple[str, str]
+    proposal: Proposal
+    separation: float
+    power: float
+
+
+def next_tests(
+    experiment: Experiment,
+    kind: Kind,
+    measurements: Sequence[Measurement],
+    pairs: Sequence[tuple[str, Sequence[Fit], str, Sequence[Fit]]],
+    noise: float,
+    inflation: float = 1.0,
+    scatter: Mapping[str, float] | None = None,
+) -> list[NextTest]:
+    """The best three further runs for each of some pairs of effects.
+
+    Args:
+        experiment: of the readings there are.
+        kind: of the measurements.
+        measurements: those the experiment was made of.
+        pairs: two effects by name, each with the models that fit about as well with it in one form
+            or another.
+        noise: one sigma of a reading.
+        inflation: variance of a mean of readings over what it were without correlation; at least 1.
+        scatter: relative scatter of parameters between specimens, by name: what a proposal that
+            needs a new specimen does not know. Others are made on a specimen that was measured,
+            which is taken to be as the fit says.
+    """
+    further = _further(kind, kind.proposals(measurements) if pairs else [])
+    return [
+        found
+        for a, fits_a, b, fits_b in pairs
+        for found in best_tests(
+            experiment, further, (a, b), fits_a, fits_b, noise * inflation**0.5, scatter or {}
+        )
+    ]
+
+
+def next_tests_report(tests: Sequence[NextTest]) -> list[dict[str, Any]]:
+    """As in report.json."""
+    return [
+        {
+            "effects": list(test.effects),
+            "do": test.proposal.label,
+            "separation": test.separation,
+            "power": test.power,
+            "columns": test.proposal.summary,
+        }
+        for test in tests
+    ]
+
+
+def _further(kind: Kind, proposals: Sequence[Proposal]) -> list[tuple[Proposal, Experiment]]:
+    """Proposals with their models, where they have one."""
+    found = []
+    for proposal in proposals:
+        try:
+            found.append((proposal, kind.experiment([proposal.measurement], ())))
+        except SolveError:
+            continue
+    return found
+
+
+def best_tests(
+    experiment: Experiment,
+    further: Sequence[tuple[Proposal, Experiment]],
+    effects: tuple[str, str],
+    fits_a: Sequence[Fit],
+    fits_b: Sequence[Fit],
+    sigma: float,
+    scatter: Mapping[str, float],
+    *,
+    count: int = 3,
+    draws: int = DRAWS,
+) -> list[NextTest]:
+    """The runs that tell two effects apart best, the best first.
+
+    Args:
+        experiment: of the readings there are.
+        further: proposals, each with the experiment of its run alone.
+        effects: the names of the two.
+        fits_a: models of the readings with the one, as in next_tests.
+        fits_b: with the other.
+        sigma: one sigma of a reading, for as many readings without correlation.
+        scatter: see next_tests.
+        count: runs wanted.
+        draws: of the true model's parameters, beside its fit itself.
+    """
+    # The first of each is the one that fits best: it stands for the truth.
+    sides = [
+        [Known(experiment, model, sigma) for model in sorted(fits, key=lambda f: f.sum_of_squares)]
+        for fits in (fits_a, fits_b)
+    ]
+    if not all(sides):
+        return []
+    likely = [models[0].drawn(draws) for models in sides]
+    ranked: list[tuple[float, Proposal, list[list[Foretold]]]] = []
+    for proposal, run in further:
+        own = scatter if proposal.new_specimen else {}
+        try:
+            a, b = ([Foretold(known, run, own) for known in models] for models in sides)
+        except SolveError:
+            continue
+        first = min(
+            rival.first_order(truth[0].read_at_fit)
+            for truth, rivals in ((a, b), (b, a))
+            for rival in rivals
+        )
+        ranked.append((first, proposal, [a, b]))
+    ranked.sort(key=lambda one: -one[0])
+    found: list[NextTest] = []
+    for first, proposal, (a, b) in ranked[: count + SPARE]:
+        # The first order leaves a rival less room than it has.
+        if len(found) >= count and np.sqrt(first) < found[count - 1].separation:
+            break
+        try:
+            ways = [_separations(a[0], b, likely[0]), _separations(b[0], a, likely[1])]
+        except SolveError:
+            continue
+        separation = min(float(np.median(s)) for s in ways)
+        power = min(float(np.mean(norm.cdf(s - norm.isf(LEVEL)))) for s in ways)
+        found.append(NextTest(effects, proposal, separation, power))
+        found.sort(key=lambda test: -test.separation)
+    return found[:count]
+
+
+def _separations(truth: Foretold, rivals: Sequence[Foretold], likely: Sequence[Array]) -> Array:
+    """Separations s where one model is true, as fitted and as drawn, (1 + n_draws,).
+
+    Raises:
+        SolveError: a model has no solution.
+    """
+    firsts = [rival.first_order(truth.read_at_fit) for rival in rivals]
+    nearest = [
+        rivals[k].nearest(truth.read_at_fit)
+        for k in np.argsort(firsts)[:FORMS]
+        if firsts[k] <= FAR * min(firsts)
+    ]
+    rng = np.random.default_rng(1)
+    runs = [(truth.read_at_fit, 0.0), *(truth.likely(theta, rng) for theta in likely)]
+    squares = [min(one.loss(run) for one in nearest) - own for run, own in runs]
+    return np.sqrt(np.maximum(squares, 0.0))
