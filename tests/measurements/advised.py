@@ -127,8 +127,8 @@ def bic(model: Fit, noise: float) -> float:
 
 
 def alike(fits: list[Fit], noise: float) -> list[Fit]:
-    """Those that fit about as well as the best."""
-    return [f for f in fits if bic(f, noise) < bic(fits[0], noise) + ALIKE]
+    """Those that leave about as little as the best: with more parameters they are rivals too."""
+    return [f for f in fits if f.sum_of_squares < fits[0].sum_of_squares + ALIKE * noise**2]
 
 
 def trials(recipe: Recipe, least: float = 0.9) -> Iterator[Trial]:

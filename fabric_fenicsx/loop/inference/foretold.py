@@ -29,9 +29,9 @@ Array = npt.NDArray[np.float64]
 #: first order ...
 PLAUSIBLE = 2.0
 #: ... or is made smaller, so many times, to this share.
-SHRINKS, SHRINK = 5, 0.4
-#: Evaluations of a model for a minimum.
-EVALUATIONS = 12
+SHRINKS, SHRINK = 3, 0.25
+#: Evaluations of a model for a minimum, and the share of it by which steps end.
+EVALUATIONS, ENOUGH = 12, 1e-3
 #: Residual where a model has no solution: the trust region shrinks.
 OUT_OF_REACH = 1e6
 
@@ -73,8 +73,11 @@ class Known:
         J = np.column_stack([slopes[name][rows] * weight for name in self.names])
         return (y - self.fitted.expected)[rows] * weight, J
 
-    def drawn(self, count: int) -> list[Array]:
-        """Parameters that may be the true ones, (k,) each, half of them opposite to the others."""
+    def drawn(self, count: int) -> list[tuple[Array, float]]:
+        """Parameters that may be the true ones, (k,), each with D of the readings there are.
+
+        Half of them are opposite to the others.
+        """
         half = np.random.default_rng(0).standard_normal((count // 2, len(self.at)))
         found = []
         for z in np.concatenate([half, -half]):
@@ -82,11 +85,11 @@ class Known:
             for _ in range(SHRINKS):
                 theta = np.clip(self.at + step, self.lower, self.upper)
                 try:
-                    plausible = np.sum(self.moved(theta)[0] ** 2) <= PLAUSIBLE * (z @ z)
+                    change = float(np.sum(self.moved(theta)[0] ** 2))
                 except SolveError:
-                    plausible = False
-                if plausible:
-                    found.append(theta)
+                    change = np.inf
+                if change <= PLAUSIBLE * (z @ z):
+                    found.append((theta, change))
                     break
                 step = SHRINK * step
         return found
@@ -197,12 +200,14 @@ class Foretold:
             jac=lambda theta: stacked(theta)[1],
             bounds=(self._fit.lower, self._fit.upper),
             x_scale="jac",
+            ftol=ENOUGH,
+            xtol=ENOUGH,
             max_nfev=EVALUATIONS,
         )
         return Nearest(found.x, *stacked(found.x), self._fit.lower, self._fit.upper)
 
-    def likely(self, theta: Array, rng: np.random.Generator) -> tuple[Array, float]:
-        """The run for drawn parameters, (n,), what is its own drawn too, and D of this model.
+    def likely(self, theta: Array, change: float, rng: np.random.Generator) -> tuple[Array, float]:
+        """The run for parameters as of Known.drawn, (n,), what is its own drawn too; and its D.
 
         Raises:
             SolveError: the model has no solution there.
@@ -210,8 +215,7 @@ class Foretold:
         own = [float(rng.choice(values)) for values in self._each.values()]
         different = rng.standard_normal(len(self._scatter))
         run = self._read(np.array([*theta, *own, *different]))[0]
-        change = float(np.sum(self.known.moved(theta)[0] ** 2) + different @ different)
-        return run, min(self._fit.loss(run), change)
+        return run, min(self._fit.loss(run), change + float(different @ different))
 
     def _read(self, theta: Array) -> tuple[Array, Array]:
         """The run, (n,), and its slopes, (n, m)."""

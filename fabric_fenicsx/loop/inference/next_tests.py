@@ -40,7 +40,7 @@ Array = npt.NDArray[np.float64]
 #: Probability of rejecting a true model. Convention.
 LEVEL = 0.05
 #: Draws of the true model's parameters beside its fit, half of them opposite to the others.
-DRAWS = 8
+DRAWS = 6
 #: Proposals beyond those wanted, and forms of the rival, whose minimum is found at most.
 SPARE, FORMS = 2, 3
 #: A form is left out that to first order is this many times further away than the nearest one.
@@ -87,7 +87,7 @@ def next_tests(
             needs a new specimen does not know. Others are made on a specimen that was measured,
             which is taken to be as the fit says.
     """
-    further = _further(kind, kind.proposals(measurements) if pairs else [])
+    further = _further(experiment, kind, kind.proposals(measurements) if pairs else [])
     return [
         found
         for a, fits_a, b, fits_b in pairs
@@ -111,12 +111,14 @@ def next_tests_report(tests: Sequence[NextTest]) -> list[dict[str, Any]]:
     ]
 
 
-def _further(kind: Kind, proposals: Sequence[Proposal]) -> list[tuple[Proposal, Experiment]]:
+def _further(
+    experiment: Experiment, kind: Kind, proposals: Sequence[Proposal]
+) -> list[tuple[Proposal, Experiment]]:
     """Proposals with their models, where they have one."""
     found = []
     for proposal in proposals:
         try:
-            found.append((proposal, kind.experiment([proposal.measurement], ())))
+            found.append((proposal, kind.experiment([proposal.measurement], (), like=experiment)))
         except SolveError:
             continue
     return found
@@ -185,7 +187,9 @@ def best_tests(
     return found[:count]
 
 
-def _separations(truth: Foretold, rivals: Sequence[Foretold], likely: Sequence[Array]) -> Array:
+def _separations(
+    truth: Foretold, rivals: Sequence[Foretold], likely: Sequence[tuple[Array, float]]
+) -> Array:
     """Separations s where one model is true, as fitted and as drawn, (1 + n_draws,).
 
     Raises:
@@ -198,6 +202,6 @@ def _separations(truth: Foretold, rivals: Sequence[Foretold], likely: Sequence[A
         if firsts[k] <= FAR * min(firsts)
     ]
     rng = np.random.default_rng(1)
-    runs = [(truth.read_at_fit, 0.0), *(truth.likely(theta, rng) for theta in likely)]
+    runs = [(truth.read_at_fit, 0.0), *(truth.likely(*draw, rng) for draw in likely)]
     squares = [min(one.loss(run) for one in nearest) - own for run, own in runs]
     return np.sqrt(np.maximum(squares, 0.0))

@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from ...inputs.groups import Keys
 from ...inputs.tables import Column
-from ..inference.effects import Effect
 from ..inference.experiment import Experiment
 from .proposal import Proposal
 from .schema import Measurement
@@ -63,7 +62,8 @@ class Kind:
         label: that, with its unit, as on an axis.
         columns: of each CSV file.
         fewest: readings without which a file says nothing.
-        experiment: from measurements of this kind and a user's own effects to a model of them.
+        experiment: from measurements of this kind and a user's own effects to a model of them;
+            where there are ``proposals`` also with ``like``, the experiment of the runs before.
         wrong_rig: what is wrong with a rig whose keys are right by themselves, if anything.
         mistakes: of the readings of a run, from the rig and the columns.
         made_up: from a case of this rig to a test that is measured in the model; takes the case,
@@ -82,7 +82,7 @@ class Kind:
     label: str
     columns: tuple[Column, ...]
     fewest: int
-    experiment: Callable[[Sequence[Measurement], Sequence[Effect]], Experiment]
+    experiment: Callable[..., Experiment]
     wrong_rig: Callable[[Any], str | None] = lambda rig: None
     mistakes: Callable[[Any, Mapping[str, Array]], Iterator[Mistake]] = lambda rig, columns: iter(
         ()

@@ -79,6 +79,7 @@ class Cantilever:
     Args:
         measurements: folders of this test; they share C1.
         own: effects of the user's.
+        like: other strips of the fabric, whose compiled expressions and start serve these too.
 
     Attributes:
         stiffness_per_C1: bending stiffness per width over C1 of the first folder's tow [mm³].
@@ -92,16 +93,23 @@ class Cantilever:
     quantity = "z_mm"
     notes = ()
 
-    def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
+    def __init__(
+        self,
+        measurements: Sequence[Measurement],
+        own: Sequence[Effect] = (),
+        like: Cantilever | None = None,
+    ) -> None:
         self.noise = common_noise(measurements)
         self._lay_out(measurements)
-        self._compiled: dict[tuple[StripVariant, str, bool], Marched] = {}
+        self._compiled: dict[tuple[StripVariant, str, bool], Marched] = (
+            {} if like is None else like._compiled
+        )
         slope, self.scatter = self._measured_slopes()
         unknown = np.isnan(self._arc)
         self._steepness = np.where(unknown, np.minimum(np.abs(np.tan(slope)), STEEPEST), 0.0)
-        start = self._start()
+        start = self._start() if like is None else like.baseline[0].starts[0]
         self.stiffness_per_C1 = self._specimens[0].tow.stiffness_per_C1
-        self.baseline = (
+        self.baseline: tuple[Parameter, ...] = (
             Parameter(
                 "C1_MPa",
                 (start,),

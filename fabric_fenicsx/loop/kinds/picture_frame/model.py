@@ -52,6 +52,7 @@ class PictureFrame:
     Args:
         measurements: folders of this test; they share the parameters of the fabric.
         own: effects of the user's.
+        like: other frames, whose compiled expressions serve these too.
     """
 
     test = "picture_frame"
@@ -59,7 +60,12 @@ class PictureFrame:
     baseline = BASELINE
     notes = ()
 
-    def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
+    def __init__(
+        self,
+        measurements: Sequence[Measurement],
+        own: Sequence[Effect] = (),
+        like: PictureFrame | None = None,
+    ) -> None:
         self.noise = common_noise(measurements)
         runs = [(m, run) for m in measurements for run in m.runs]
         motions = [
@@ -73,7 +79,7 @@ class PictureFrame:
             "frame": Varying(np.array([[m.rig.frame_length_mm for m, _ in runs]])),
             "fabric": Varying(np.array([[m.rig.fabric_length_mm for m, _ in runs]])),
         }
-        self._compiled: dict[Any, Marched] = {}
+        self._compiled: dict[Any, Marched] = {} if like is None else like._compiled
         kinematics = self._kinematics(self._travel(None, {}), {})
         gamma, rate = (self._at_readings(kinematics[key].value) for key in ("gamma", "rate"))
         time = self._at_readings(self._points["time"].value)
