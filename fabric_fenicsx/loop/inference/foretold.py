@@ -120,8 +120,11 @@ class Nearest:
         # As many rows as there are parameters, and one, have the same sum of squares.
         R = np.asarray(np.linalg.qr(np.column_stack([self.J / scale, r]), mode="r"))
         low, high = ((end - self.theta) * scale for end in (self.lower, self.upper))
-        solved = lsq_linear(R[:, :-1], -R[:, -1], (np.minimum(low, 0.0), np.maximum(high, 0.0)))
-        return self.theta + solved.x / scale, 2.0 * float(solved.cost)
+        step = np.linalg.lstsq(R[:, :-1], -R[:, -1], rcond=None)[0]
+        if not ((low <= step) & (step <= high)).all():
+            step = lsq_linear(R[:, :-1], -R[:, -1], (low, high), method="bvls").x
+        left = R[:, :-1] @ step + R[:, -1]
+        return np.clip(self.theta + step / scale, self.lower, self.upper), float(left @ left)
 
     def loss(self, run: Array) -> float:
         """D to first order about these parameters."""

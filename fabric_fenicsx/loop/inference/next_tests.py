@@ -1,6 +1,7 @@
 """Which further run would tell two models apart that fit the readings alike, and how well.
 
-Let A be true. Its parameters are known as well as the readings tell: they are drawn about its fit.
+Let A be true, in one of its forms, as likely as BIC says. Its parameters are known as well as the
+readings tell: they are drawn about its fit.
 A further run y, all but its noise, takes away from B, whatever B makes of its own parameters then,
 
     D_B = min over θ of |y - y_B(θ)|²/σ² + |Y_B(θ) - Y_B(θ̂)|²/σ²
@@ -29,6 +30,7 @@ from ...errors import SolveError
 from ..measurement.kind import Kind
 from ..measurement.proposal import Proposal
 from ..measurement.schema import Measurement
+from .effects import Variant
 from .experiment import Experiment
 from .fitting import Fit
 from .foretold import Foretold, Known
@@ -39,8 +41,12 @@ Array = npt.NDArray[np.float64]
 
 #: Probability of rejecting a true model. Convention.
 LEVEL = 0.05
-#: Draws of the true model's parameters beside its fit, half of them opposite to the others.
+#: Share of what may be true, forms and parameters, at which the separation is less than it is said.
+SELDOM = 0.1
+#: Draws of the true model's parameters beside its fits in several forms.
 DRAWS = 6
+#: Forms that may be true, at most, and the probability below which one is not asked.
+TRUTHS, UNLIKELY = 4, 0.02
 #: Proposals beyond those wanted, and forms of the rival, whose minimum is found at most.
 SPARE, FORMS = 2, 3
 #: A form is left out that to first order is this many times further away than the nearest one.
@@ -54,8 +60,9 @@ class NextTest:
     Attributes:
         effects: their names.
         proposal: what to do.
-        separation: s, in units of the noise; the median over what is not known of the true model.
-        power: probability that the wrong effect is rejected at 5 %; the mean over that.
+        separation: s, in units of the noise; nine times in ten, over what is not known of the true
+            model, at least this.
+        power: probability that the wrong effect is rejected at 5 %, over that.
     """
 
     effects: tuple[str, str]
@@ -149,59 +156,105 @@ def best_tests(
         count: runs wanted.
         draws: of the true model's parameters, beside its fit itself.
     """
-    # The first of each is the one that fits best: it stands for the truth.
-    sides = [
-        [Known(experiment, model, sigma) for model in sorted(fits, key=lambda f: f.sum_of_squares)]
-        for fits in (fits_a, fits_b)
-    ]
-    if not all(sides):
+    sides = [_Side(experiment, fits, sigma, draws) for fits in (fits_a, fits_b) if fits]
+    if len(sides) < 2:
         return []
-    likely = [models[0].drawn(draws) for models in sides]
     ranked: list[tuple[float, Proposal, list[list[Foretold]]]] = []
     for proposal, run in further:
         own = scatter if proposal.new_specimen else {}
         try:
-            a, b = ([Foretold(known, run, own) for known in models] for models in sides)
+            both = [[Foretold(known, run, own) for known in side.models] for side in sides]
         except SolveError:
             continue
         first = min(
-            rival.first_order(truth[0].read_at_fit)
-            for truth, rivals in ((a, b), (b, a))
-            for rival in rivals
+            _seldom_less(
+                np.array(
+                    [min(m.first_order(truth.read_at_fit) for m in rivals) for truth in truths]
+                ),
+                side.weights,
+            )
+            for side, truths, rivals in zip(sides, both, both[::-1], strict=True)
         )
-        ranked.append((first, proposal, [a, b]))
+        ranked.append((np.sqrt(first), proposal, both))
     ranked.sort(key=lambda one: -one[0])
     found: list[NextTest] = []
-    for first, proposal, (a, b) in ranked[: count + SPARE]:
+    for first, proposal, both in ranked[: count + SPARE]:
         # The first order leaves a rival less room than it has.
-        if len(found) >= count and np.sqrt(first) < found[count - 1].separation:
+        if len(found) >= count and first < found[count - 1].separation:
             break
         try:
-            ways = [_separations(a[0], b, likely[0]), _separations(b[0], a, likely[1])]
+            ways = [
+                side.separations(truths, rivals)
+                for side, truths, rivals in zip(sides, both, both[::-1], strict=True)
+            ]
         except SolveError:
             continue
-        separation = min(float(np.median(s)) for s in ways)
-        power = min(float(np.mean(norm.cdf(s - norm.isf(LEVEL)))) for s in ways)
+        separation = min(_seldom_less(s, weights) for s, weights in ways)
+        power = min(float(norm.cdf(s - norm.isf(LEVEL)) @ weights) for s, weights in ways)
         found.append(NextTest(effects, proposal, separation, power))
-        found.sort(key=lambda test: -test.separation)
+        found.sort(key=lambda test: (-test.separation, -test.power))
     return found[:count]
 
 
-def _separations(
-    truth: Foretold, rivals: Sequence[Foretold], likely: Sequence[tuple[Array, float]]
-) -> Array:
-    """Separations s where one model is true, as fitted and as drawn, (1 + n_draws,).
+class _Side:
+    """One of two effects: its forms, and how likely each of them is.
 
-    Raises:
-        SolveError: a model has no solution.
+    Args:
+        experiment: of the readings there are.
+        fits: of them, in one form or another.
+        sigma: of a reading.
+        draws: of parameters, in all.
+
+    Attributes:
+        models: with each form, the likelier first.
+        weights: their probabilities by BIC, (n_truths,), of those that may well be true.
     """
-    firsts = [rival.first_order(truth.read_at_fit) for rival in rivals]
-    nearest = [
-        rivals[k].nearest(truth.read_at_fit)
-        for k in np.argsort(firsts)[:FORMS]
-        if firsts[k] <= FAR * min(firsts)
-    ]
-    rng = np.random.default_rng(1)
-    runs = [(truth.read_at_fit, 0.0), *(truth.likely(*draw, rng) for draw in likely)]
-    squares = [min(one.loss(run) for one in nearest) - own for run, own in runs]
-    return np.sqrt(np.maximum(squares, 0.0))
+
+    def __init__(
+        self, experiment: Experiment, fits: Sequence[Fit], sigma: float, draws: int
+    ) -> None:
+        def bic(model: Fit) -> float:
+            count = np.log(max(model.used.sum(), 2))
+            return model.sum_of_squares / sigma**2 + len(model.values) * float(count)
+
+        best: dict[tuple[Variant, ...], Fit] = {}
+        for model in sorted(fits, key=bic):
+            best.setdefault(model.variants, model)
+        self.models = [Known(experiment, model, sigma) for model in best.values()]
+        bics = np.array([bic(model) for model in best.values()])
+        weights = np.exp(-0.5 * (bics - bics[0]))
+        weights = weights[: max(int(np.sum(weights > UNLIKELY * weights.sum())), 1)][:TRUTHS]
+        self.weights = weights / weights.sum()
+        # In pairs, opposite to each other.
+        each = 2 * -(-draws // (2 * len(weights)))
+        self._drawn = [known.drawn(each) for known in self.models[: len(weights)]]
+
+    def separations(
+        self, truths: Sequence[Foretold], rivals: Sequence[Foretold]
+    ) -> tuple[Array, Array]:
+        """Separations s where this effect is there, as fitted and as drawn, and their weights.
+
+        Raises:
+            SolveError: a model has no solution.
+        """
+        found, weights = [], []
+        rng = np.random.default_rng(1)
+        for truth, weight, drawn in zip(truths, self.weights, self._drawn, strict=False):
+            firsts = [rival.first_order(truth.read_at_fit) for rival in rivals]
+            nearest = [
+                rivals[k].nearest(truth.read_at_fit)
+                for k in np.argsort(firsts)[:FORMS]
+                if firsts[k] <= FAR * min(firsts)
+            ]
+            runs = [(truth.read_at_fit, 0.0), *(truth.likely(*draw, rng) for draw in drawn)]
+            found += [min(one.loss(run) for one in nearest) - own for run, own in runs]
+            weights += [weight / len(runs)] * len(runs)
+        return np.sqrt(np.maximum(found, 0.0)), np.array(weights)
+
+
+def _seldom_less(values: Array, weights: Array) -> float:
+    """What all but a tenth of some values exceed, or reach, by their weights, (n,) each."""
+    values = values[: len(weights)]
+    order = np.argsort(values)
+    place = int(np.searchsorted(np.cumsum(weights[order]), SELDOM))
+    return float(values[order][min(place, len(order) - 1)])
