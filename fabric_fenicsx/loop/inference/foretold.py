@@ -158,7 +158,11 @@ class Foretold:
             self._each.setdefault(of_run(p, 0).name, []).append(known.fitted.values[p.name])
         shared = set(known.names) - {p.name for p in of_runs}
         self._place = {n: k for k, n in enumerate(known.names) if n in shared}
-        self._scatter = {n: share for n, share in scatter.items() if n in shared and share > 0.0}
+        self._scatter = {
+            n: share * abs(known.fitted.values[n])
+            for n, share in scatter.items()
+            if n in shared and share > 0.0
+        }
         own = [p for v in self._variants for p in v.parameters if p.name in self._each]
         none = np.zeros(len(self._scatter))
         at = np.array([*known.at, *(values[0] for values in self._each.values()), *none])
@@ -226,18 +230,15 @@ class Foretold:
         first = len(self.known.names)
         own = {name: k for k, name in enumerate(self._each, start=first)}
         other = {name: k for k, name in enumerate(self._scatter, start=first + len(own))}
-        factor = {name: 1.0 + self._scatter[name] * float(theta[k]) for name, k in other.items()}
-        values = {name: value * factor.get(name, 1.0) for name, value in values.items()}
-        y, slopes = self._run.predict(
-            self._variants, values | {name: float(theta[k]) for name, k in own.items()}
-        )
+        for name, k in other.items():
+            values[name] += self._scatter[name] * float(theta[k])
+        values |= {name: float(theta[k]) for name, k in own.items()}
+        y, slopes = self._run.predict(self._variants, values)
         J = np.zeros((len(y), len(theta)))
-        for name, k in self._place.items():
-            J[:, k] = slopes[name] * factor.get(name, 1.0)
-        for name, k in own.items():
+        for name, k in (*self._place.items(), *own.items()):
             J[:, k] = slopes[name]
         for name, k in other.items():
-            J[:, k] = slopes[name] * self._scatter[name] * theta[self._place[name]]
+            J[:, k] = slopes[name] * self._scatter[name]
         rows = self._run.readings.usable
         if not (np.isfinite(y[rows]).all() and np.isfinite(J[rows]).all()):
             raise SolveError("the model is not a number at these parameters")

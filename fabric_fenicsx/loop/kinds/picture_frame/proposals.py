@@ -111,7 +111,7 @@ def _path(legs: Sequence[_Leg], frame: float, count: int) -> tuple[Array, Array]
                 corners.append(corners[-1] + seconds)
                 places.append(goal)
     pieces = len(corners) - 1
-    each = max((count - 1) // pieces, FEWEST)
+    each = max(-(-(count - 1) // pieces), FEWEST)
     time = np.interp(np.arange(pieces * each + 1) / each, np.arange(pieces + 1), corners)
     travel = np.interp(time, corners, places)
     return np.round(time, DECIMALS), np.round(travel, DECIMALS)
