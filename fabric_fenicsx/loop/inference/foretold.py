@@ -29,9 +29,9 @@ Array = npt.NDArray[np.float64]
 #: first order ...
 PLAUSIBLE = 2.0
 #: ... or is made smaller, so many times, to this share.
-SHRINKS, SHRINK = 3, 0.25
+SHRINKS, SHRINK = 2, 0.2
 #: Evaluations of a model for a minimum, and the share of it by which steps end.
-EVALUATIONS, ENOUGH = 12, 1e-3
+EVALUATIONS, ENOUGH = 8, 1e-3
 #: Residual where a model has no solution: the trust region shrinks.
 OUT_OF_REACH = 1e6
 
@@ -184,7 +184,7 @@ class Foretold:
         Raises:
             SolveError: the model has no solution at its fit.
         """
-        tried: dict[bytes, tuple[Array, Array]] = {}
+        tried = {self._fit.theta.tobytes(): (self._fit.r, self._fit.J)}
 
         def stacked(theta: Array) -> tuple[Array, Array]:
             if (key := theta.tobytes()) not in tried:

@@ -44,11 +44,13 @@ LEVEL = 0.05
 #: Share of what may be true, forms and parameters, at which the separation is less than it is said.
 SELDOM = 0.1
 #: Draws of the true model's parameters beside its fits in several forms.
-DRAWS = 6
+DRAWS = 4
 #: Forms that may be true, at most, and the probability below which one is not asked.
 TRUTHS, UNLIKELY = 4, 0.02
 #: Proposals beyond those wanted, and forms of the rival, whose minimum is found at most.
 SPARE, FORMS = 2, 3
+#: A separation below which a run is no advice, unless it is the best there is.
+FAINT = 1.0
 #: A form is left out that to first order is this many times further away than the nearest one.
 FAR = 4.0
 
@@ -80,7 +82,7 @@ def next_tests(
     inflation: float = 1.0,
     scatter: Mapping[str, float] | None = None,
 ) -> list[NextTest]:
-    """The best three further runs for each of some pairs of effects.
+    """The best further runs, three at most, for each of some pairs of effects.
 
     Args:
         experiment: of the readings there are.
@@ -180,7 +182,9 @@ def best_tests(
     found: list[NextTest] = []
     for first, proposal, both in ranked[: count + SPARE]:
         # The first order leaves a rival less room than it has.
-        if len(found) >= count and first < found[count - 1].separation:
+        if found and first < max(
+            FAINT, found[count - 1].separation if len(found) >= count else 0.0
+        ):
             break
         try:
             ways = [
