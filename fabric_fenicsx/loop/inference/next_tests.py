@@ -30,7 +30,6 @@ from ...errors import SolveError
 from ..measurement.kind import Kind
 from ..measurement.proposal import Proposal
 from ..measurement.schema import Measurement
-from .effects import Variant
 from .experiment import Experiment
 from .fitting import Fit
 from .foretold import Foretold, Known
@@ -45,8 +44,8 @@ LEVEL = 0.05
 SELDOM = 0.1
 #: Draws of the true model's parameters beside its fits in several forms.
 DRAWS = 4
-#: Forms that may be true, at most, and the probability below which one is not asked.
-TRUTHS, UNLIKELY = 4, 0.02
+#: Fits that may be true, at most, and the probability below which one is not asked.
+TRUTHS, UNLIKELY = 5, 0.02
 #: Proposals beyond those wanted, and forms of the rival, whose minimum is found at most.
 SPARE, FORMS = 2, 3
 #: A separation below which a run is no advice, unless it is the best there is.
@@ -88,8 +87,8 @@ def next_tests(
         experiment: of the readings there are.
         kind: of the measurements.
         measurements: those the experiment was made of.
-        pairs: two effects by name, each with the models that fit about as well with it in one form
-            or another.
+        pairs: two effects by name, each with all models that leave about as little with it, in
+            one form or another: also those with more parameters, and a form in several places.
         noise: one sigma of a reading.
         inflation: variance of a mean of readings over what it were without correlation; at least 1.
         scatter: relative scatter of parameters between specimens, by name: what a proposal that
@@ -201,7 +200,7 @@ def best_tests(
 
 
 class _Side:
-    """One of two effects: its forms, and how likely each of them is.
+    """One of two effects: the models with it, and how likely each of them is.
 
     Args:
         experiment: of the readings there are.
@@ -210,7 +209,7 @@ class _Side:
         draws: of parameters, in all.
 
     Attributes:
-        models: with each form, the likelier first.
+        models: the likelier first.
         weights: their probabilities by BIC, (n_truths,), of those that may well be true.
     """
 
@@ -221,11 +220,13 @@ class _Side:
             count = np.log(max(model.used.sum(), 2))
             return model.sum_of_squares / sigma**2 + len(model.values) * float(count)
 
-        best: dict[tuple[Variant, ...], Fit] = {}
+        # Two fits of a form are two only if they ended in two places.
+        places: dict[tuple[Any, ...], Fit] = {}
         for model in sorted(fits, key=bic):
-            best.setdefault(model.variants, model)
-        self.models = [Known(experiment, model, sigma) for model in best.values()]
-        bics = np.array([bic(model) for model in best.values()])
+            values = (f"{value:.2g}" for value in model.values.values())
+            places.setdefault((model.variants, *values), model)
+        self.models = [Known(experiment, model, sigma) for model in places.values()]
+        bics = np.array([bic(model) for model in places.values()])
         weights = np.exp(-0.5 * (bics - bics[0]))
         weights = weights[: max(int(np.sum(weights > UNLIKELY * weights.sum())), 1)][:TRUTHS]
         self.weights = weights / weights.sum()
