@@ -133,8 +133,8 @@ def alike(fits: list[Fit], noise: float) -> list[Fit]:
     return [f for f in fits if f.sum_of_squares < fits[0].sum_of_squares + ALIKE * noise**2]
 
 
-def trials(recipe: Recipe, least: float = 0.9) -> Iterator[Trial]:
-    """What comes of advice on a set, for each rival of its effect.
+def trials(recipe: Recipe, least: float = 0.9, rivals: Sequence[str] = ()) -> Iterator[Trial]:
+    """What comes of advice on a set, for each rival of its effect, or for some.
 
     Advice of less power than `least` is not carried out.
     """
@@ -145,7 +145,7 @@ def trials(recipe: Recipe, least: float = 0.9) -> Iterator[Trial]:
     noise, true = made.truth.noise, made.truth.effects[0]["name"]
     kind = kind_of(measured.test)
     experiment = kind.experiment([measured], ())
-    base, found = forms(experiment, noise, ())
+    base, found = forms(experiment, noise, (true, *rivals) if rivals else ())
     if true not in found or bic(base, noise) < bic(found[true][0], noise) + ALIKE:
         # Nothing is lacking for all that the set shows.
         return
