@@ -168,22 +168,16 @@ def best_tests(
         except SolveError:
             continue
         first = min(
-            _seldom_less(
-                np.array(
-                    [min(m.first_order(truth.read_at_fit) for m in rivals) for truth in truths]
-                ),
-                side.weights,
-            )
+            side.first_order(truths, rivals)
             for side, truths, rivals in zip(sides, both, both[::-1], strict=True)
         )
-        ranked.append((np.sqrt(first), proposal, both))
+        ranked.append((first, proposal, both))
     ranked.sort(key=lambda one: -one[0])
     found: list[NextTest] = []
     for first, proposal, both in ranked[: count + SPARE]:
         # The first order leaves a rival less room than it has.
-        if found and first < max(
-            FAINT, found[count - 1].separation if len(found) >= count else 0.0
-        ):
+        least = found[count - 1].separation if len(found) >= count else FAINT
+        if found and first < least:
             break
         try:
             ways = [
@@ -234,6 +228,12 @@ class _Side:
         each = 2 * -(-draws // (2 * len(weights)))
         self._drawn = [known.drawn(each) for known in self.models[: len(weights)]]
 
+    def first_order(self, truths: Sequence[Foretold], rivals: Sequence[Foretold]) -> float:
+        """The separation where this effect is there as fitted, to first order."""
+        mine = (truth.read_at_fit for truth in truths[: len(self.weights)])
+        squares = [min(rival.first_order(run) for rival in rivals) for run in mine]
+        return float(np.sqrt(_seldom_less(np.array(squares), self.weights)))
+
     def separations(
         self, truths: Sequence[Foretold], rivals: Sequence[Foretold]
     ) -> tuple[Array, Array]:
@@ -259,7 +259,6 @@ class _Side:
 
 def _seldom_less(values: Array, weights: Array) -> float:
     """What all but a tenth of some values exceed, or reach, by their weights, (n,) each."""
-    values = values[: len(weights)]
     order = np.argsort(values)
     place = int(np.searchsorted(np.cumsum(weights[order]), SELDOM))
     return float(values[order][min(place, len(order) - 1)])
