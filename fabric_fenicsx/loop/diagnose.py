@@ -16,6 +16,7 @@ from ..output.folder import prepare_folder
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect
 from .inference.experiment import Experiment
+from .inference.next_tests import next_tests
 from .inference.search import diagnose_test
 from .inference.starts import SMALL
 from .kinds import KINDS
@@ -112,7 +113,18 @@ def diagnose(
             diagnosis = diagnose_test(experiment, effects, part)
         except SolveError as error:
             raise _unfitted(kind, error) from error
-        parts.append((diagnosis, test_report(diagnosis, same)))
+        part(0.95, "further tests")
+        noise = diagnosis.noise_model
+        advice = next_tests(
+            experiment,
+            kind,
+            same,
+            diagnosis.pairs,
+            diagnosis.noise,
+            (1.0 + noise.correlation) / (1.0 - noise.correlation),
+            diagnosis.final.variances.scatter,
+        )
+        parts.append((diagnosis, test_report(diagnosis, same, advice)))
     report = combined_report([content for _, content in parts])
     if folder is not None:
         progress(1.0, "drawing")

@@ -18,6 +18,7 @@ from .noise import Noise, Whiteness
 __all__ = ["Candidate", "Diagnosis", "Verdict"]
 
 Flags = npt.NDArray[np.bool_]
+Pair = tuple[str, list[Fit], str, list[Fit]]
 Verdict = Literal["no_effect", "effect_found", "unexplained"]
 
 
@@ -63,6 +64,7 @@ class Diagnosis:
         outliers: readings that were left out, (n,).
         curve: what readings know that are all on one curve; None where they know more.
         laboratories: where there are several folders, what the others say of each.
+        pairs: effects that are not told apart, with the models of each that fit as well.
         of_the_curve: effects that are such a curve, where one was looked for.
     """
 
@@ -89,4 +91,5 @@ class Diagnosis:
     curve: Curve | None = None
     of_the_curve: tuple[str, ...] = ()
     laboratories: tuple[Laboratory, ...] = ()
+    pairs: list[Pair] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)

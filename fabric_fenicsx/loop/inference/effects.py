@@ -13,7 +13,7 @@ from typing import Any
 
 from ...inputs.parameters import Parameter
 
-__all__ = ["Effect", "Parameter", "Values", "Variant", "scaled"]
+__all__ = ["Effect", "Parameter", "Values", "Variant", "of_run", "scaled"]
 
 Values = Mapping[str, Any]
 
@@ -83,3 +83,9 @@ def scaled(effect: Effect, shares: Mapping[str, float]) -> Effect:
         replace(v, parameters=tuple(parameter(p) for p in v.parameters)) for v in effect.variants
     )
     return replace(effect, variants=variants)
+
+
+def of_run(p: Parameter, run: int) -> Parameter:
+    """A parameter as that of one run alone, counted from 0; it may have been another run's."""
+    name = p.name if p.run is None else p.name.split("_", 1)[1]
+    return replace(p, name=f"run{run + 1}_{name}", run=run)

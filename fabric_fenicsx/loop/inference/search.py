@@ -11,12 +11,12 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
-from .diagnosis import Candidate, Diagnosis, Verdict
+from .diagnosis import Candidate, Diagnosis, Pair, Verdict
 from .effects import Effect
 from .experiment import Experiment
 from .fitting import Fit, fit
@@ -77,6 +77,7 @@ class _Search:
         self.experiment, self.progress = experiment, progress
         self.effects = [e for e in experiment.effects if names is None or e.name in names]
         self.judge = Judge(experiment, self.effects)
+        self._forms: dict[frozenset[Effect], list[Fit]] = {}
         self._start = {p.name: p.starts[0] for p in experiment.baseline}
         self.variances = self._first_variances()
         fitted = self._baseline(self._start)
@@ -140,6 +141,8 @@ class _Search:
         judged = final if verdict != "unexplained" else nearest
         misfit = self.judge.misfit(judged)
         curve = self._curve(judged) if verdict == "unexplained" else None
+        of_the_curve = self._of_the_curve(levels) if curve is not None else ()
+        rivals = self._rivals(final, levels)
         for candidate in candidates:
             if candidate.fit is not None:
                 candidate.holdout = self.judge.holdout(candidate.fit)
@@ -154,7 +157,8 @@ class _Search:
             final=final.fit,
             best=nearest.fit if verdict == "unexplained" and nearest.effects else None,
             effects=final.effects,
-            rivals=self._rivals(final, levels),
+            rivals=rivals,
+            pairs=self._pairs(final, rivals, of_the_curve),
             candidates=candidates,
             holdout_before=self.judge.holdout(baseline.fit),
             holdout_after=self.judge.holdout(final.fit),
@@ -165,7 +169,7 @@ class _Search:
             white_after=self.judge.misfit(final).whiteness,
             outliers=self.judge.outliers,
             curve=curve,
-            of_the_curve=self._of_the_curve(levels) if curve is not None else (),
+            of_the_curve=of_the_curve,
             laboratories=tuple(self.judge.laboratories(judged.fit, misfit.noise)),
             notes=[*self.experiment.notes, *self._notes(final.fit, baseline.fit)],
         )
@@ -179,7 +183,7 @@ class _Search:
             effect: {v: signatures(self.experiment, base, alike, v) for v in effect.variants}
             for effect in self.effects
         }
-        self._base, self._signatures = base, signs
+        self._base, self._signatures, self._forms = base, signs, {}
         screen = self._screened()
         levels = [[self._refined(self.judge.weighed(base, ()))]]
         if not self.effects:
@@ -229,7 +233,7 @@ class _Search:
         return CRITERIA.far
 
     def _fitted(self, combinations: Sequence[Combination], starts: int) -> list[Fit]:
-        return fit_combinations(
+        found = fit_combinations(
             self.experiment,
             self._base,
             combinations,
@@ -237,6 +241,10 @@ class _Search:
             starts=starts,
             robust=self._robust,
         )
+        for model in found:
+            effects = frozenset(self._effects_of(model))
+            self._forms.setdefault(effects, []).append(model)
+        return found
 
     def _effects_of(self, model: Fit) -> tuple[Effect, ...]:
         return tuple(next(e for e in self.effects if v in e.variants) for v in model.variants)
@@ -360,6 +368,29 @@ class _Search:
                 if known and min(m.criterion for m in known) < limit:
                     found[own.name].append(other.name)
         return found
+
+    def _pairs(
+        self, final: Model, rivals: Mapping[str, Sequence[str]], of_the_curve: Sequence[str]
+    ) -> list[Pair]:
+        """Effects that are not told apart, each with all models that fit about as well."""
+        by_name = {e.name: e for e in self.effects}
+        pairs = [(own, other) for own, others in rivals.items() for other in others]
+        pairs += [(of_the_curve[0], other) for other in of_the_curve[1:]]
+        found = []
+        for own, other in pairs:
+            kept = frozenset(e for e in final.effects if e.name != own)
+            forms = [
+                self._nearest_forms(self._forms.get(kept | {by_name[name]}, []))
+                for name in (own, other)
+            ]
+            if all(forms):
+                found.append((own, forms[0], other, forms[1]))
+        return found[: CRITERIA.pairs]
+
+    def _nearest_forms(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Those of some fits that leave about as little as the best of them."""
+        least = min((f.sum_of_squares for f in fits), default=0.0)
+        return [f for f in fits if f.sum_of_squares < least + CRITERIA.decisive]
 
     def _effects_of_form(self, variant: object) -> Effect:
         return next(e for e in self.effects if variant in e.variants)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from ...inputs.groups import Keys
 from ...inputs.tables import Column
-from ..inference.effects import Effect
 from ..inference.experiment import Experiment
+from .proposal import Proposal
 from .schema import Measurement
 
 __all__ = ["Kind", "MadeUp", "Mistake", "called_later"]
@@ -62,14 +62,15 @@ class Kind:
         label: that, with its unit, as on an axis.
         columns: of each CSV file.
         fewest: readings without which a file says nothing.
-        experiment: from measurements of this kind and a user's own effects to a model of them.
+        experiment: from measurements of this kind and a user's own effects to a model of them;
+            where there are ``proposals`` also with ``like``, the experiment of the runs before.
         wrong_rig: what is wrong with a rig whose keys are right by themselves, if anything.
         mistakes: of the readings of a run, from the rig and the columns.
         made_up: from a case of this rig to a test that is measured in the model; takes the case,
             what messages call it, the noise, the readings of a run, the seed, a user's own
             effects, and its ``options`` by name. None: there is no such trial.
         options: what only this kind's ``made_up`` takes by name.
-        further_tests: what to measure to tell two effects apart, by their names.
+        proposals: from measurements of this kind to runs that its rig could do next.
         needs_others: its model takes what was fitted to kinds before it (``Experiment.take``).
         scattered: readings lie all over a sheet, on no line.
     """
@@ -80,17 +81,13 @@ class Kind:
     label: str
     columns: tuple[Column, ...]
     fewest: int
-    experiment: Callable[[Sequence[Measurement], Sequence[Effect]], Experiment]
+    experiment: Callable[..., Experiment]
     wrong_rig: Callable[[Any], str | None] = lambda rig: None
     mistakes: Callable[[Any, Mapping[str, Array]], Iterator[Mistake]] = lambda rig, columns: iter(
         ()
     )
     made_up: Callable[..., MadeUp] | None = None
     options: tuple[str, ...] = ()
-    further_tests: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    proposals: Callable[[Sequence[Measurement]], list[Proposal]] = lambda measurements: []
     needs_others: bool = False
     scattered: bool = False
-
-    def further_test(self, one: str, other: str) -> str | None:
-        """What to measure to tell two effects apart, a sentence; None where nothing is known."""
-        return self.further_tests.get((one, other)) or self.further_tests.get((other, one))

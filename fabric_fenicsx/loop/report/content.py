@@ -18,7 +18,7 @@ from ..inference.criteria import CRITERIA
 from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Effect, Parameter, Variant
 from ..inference.fitting import Fit, parameters_of
-from ..kinds import kind_of
+from ..inference.next_tests import NextTest, next_tests_report
 from ..measurement.schema import Measurement, Run
 
 __all__ = ["SCHEMA", "combined_report", "headline", "parameter_unit", "test_report"]
@@ -47,12 +47,15 @@ def parameter_unit(name: str) -> str:
     return next((text for end, text in endings.items() if name.endswith("_" + end)), "")
 
 
-def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> dict[str, Any]:
+def test_report(
+    diagnosis: Diagnosis, measurements: Sequence[Measurement], advice: Sequence[NextTest] = ()
+) -> dict[str, Any]:
     """The report of one test.
 
     Args:
         diagnosis: what was found.
         measurements: the folders that were read, in the order of the experiment's runs.
+        advice: further runs that would tell rivals apart.
 
     Returns:
         The content of report.json; a number that is not finite is None.
@@ -93,7 +96,7 @@ def test_report(diagnosis: Diagnosis, measurements: Sequence[Measurement]) -> di
         "holdout_source": d.holdout_source,
         "model": _numbers(d, d.final, d.holdout_after),
         "best": None if d.best is None else _numbers(d, d.best, d.holdout_best),
-        "further_tests": _further_tests(d),
+        "next_tests": next_tests_report(sorted(advice, key=lambda t: -t.separation)),
         "identifiability": {
             "correlated": [list(pair) for pair in d.final.correlated],
             "at_bound": list(d.final.at_bound),
@@ -303,16 +306,6 @@ def _parameters(d: Diagnosis) -> list[Parameter]:
     models = [d.final] if d.best is None else [d.final, d.best]
     found = {p.name: p for model in models for p in parameters_of(d.experiment, model.variants)}
     return list(found.values())
-
-
-def _further_tests(d: Diagnosis) -> list[dict[str, Any]]:
-    """What would tell each effect from its rivals, where that is known."""
-    kind = kind_of(d.experiment.test)
-    return [
-        {"effects": [effect.name, rival], "do": kind.further_test(effect.name, rival)}
-        for effect in d.effects
-        for rival in d.rivals.get(effect.name, [])
-    ]
 
 
 def _left_out(d: Diagnosis, measurements: Sequence[Measurement]) -> dict[str, Any]:

@@ -22,6 +22,9 @@ class CantileverRig(Keys):
 
     width_mm: Positive = Field(description="of the specimens")
     gravity_mm_s2: Positive = Field(9810.0, description="downwards")
+    upside_down: bool = Field(
+        False, description="strips turned over in their clamp, against those of other folders"
+    )
 
 
 def _mistakes(rig: CantileverRig, columns: Mapping[str, Array]) -> Iterator[Mistake]:
@@ -31,9 +34,6 @@ def _mistakes(rig: CantileverRig, columns: Mapping[str, Array]) -> Iterator[Mist
     reach = np.hypot(columns["x_mm"], columns["z_mm"])
     yield "x_mm", reach > 1.1 * length, "within length_mm of the clamp"
 
-
-LENGTHS = "specimens of several overhangs, the longest at least twice the shortest"
-TURNED_OVER = "the same strip turned upside down: what belongs to the strip changes its sign"
 
 CANTILEVER = Kind(
     name="cantilever",
@@ -50,16 +50,5 @@ CANTILEVER = Kind(
     mistakes=_mistakes,
     experiment=called_later(f"{__name__}.model", "Cantilever"),
     made_up=called_later(f"{__name__}.made_up", "made_up"),
-    further_tests={
-        ("clamp_compliance", "clamp_tilt"): (
-            LENGTHS
-            + ": a yielding clamp turns with the moment of the weight, a tilt is the same for "
-            "all; or the clamp turned upside down, which changes the sign of a tilt alone"
-        ),
-        ("clamp_compliance", "nonlinear_bending"): LENGTHS,
-        ("clamp_compliance", "residual_curvature"): TURNED_OVER,
-        ("clamp_tilt", "nonlinear_bending"): LENGTHS,
-        ("clamp_tilt", "residual_curvature"): TURNED_OVER + ", a tilt of the clamp does not",
-        ("nonlinear_bending", "residual_curvature"): TURNED_OVER,
-    },
+    proposals=called_later(f"{__name__}.proposals", "proposals"),
 )

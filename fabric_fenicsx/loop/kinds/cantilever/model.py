@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -62,6 +63,7 @@ class _Specimen:
         specimen: its number.
         rows: places of the readings, (n,).
         s, x, z: of the readings [mm], (n,); s is NaN where it is not known.
+        upside_down: whether it was turned over in its clamp.
     """
 
     tow: HangingTow
@@ -70,6 +72,7 @@ class _Specimen:
     s: Array
     x: Array
     z: Array
+    upside_down: bool
 
 
 class Cantilever:
@@ -78,6 +81,7 @@ class Cantilever:
     Args:
         measurements: folders of this test; they share C1.
         own: effects of the user's.
+        like: other strips of the fabric, whose compiled expressions and start serve these too.
 
     Attributes:
         stiffness_per_C1: bending stiffness per width over C1 of the first folder's tow [mm³].
@@ -92,16 +96,23 @@ class Cantilever:
     notes = ()
     one_curve = None
 
-    def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
+    def __init__(
+        self,
+        measurements: Sequence[Measurement],
+        own: Sequence[Effect] = (),
+        like: Cantilever | None = None,
+    ) -> None:
         self.noise = common_noise(measurements)
         self._lay_out(measurements)
-        self._compiled: dict[tuple[StripVariant, str], Marched] = {}
+        self._compiled: dict[tuple[StripVariant, str, bool], Marched] = (
+            {} if like is None else like._compiled
+        )
         slope, self.scatter = self._measured_slopes()
         unknown = np.isnan(self._arc)
         self._steepness = np.where(unknown, np.minimum(np.abs(np.tan(slope)), STEEPEST), 0.0)
-        start = self._start()
+        start = self._start() if like is None else like.baseline[0].starts[0]
         self.stiffness_per_C1 = self._specimens[0].tow.stiffness_per_C1
-        self.baseline = (
+        self.baseline: tuple[Parameter, ...] = (
             Parameter(
                 "C1_MPa",
                 (start,),
@@ -128,10 +139,10 @@ class Cantilever:
 
     def _lay_out(self, measurements: Sequence[Measurement]) -> None:
         """Readings in the order of runs, in a run by length and along the strip."""
-        tows: dict[tuple[float, ...], HangingTow] = {}
+        tows: dict[tuple[Any, ...], HangingTow] = {}
         table: list[Array] = []
         run_of: list[npt.NDArray[np.int64]] = []
-        keys: list[tuple[int, tuple[float, ...]]] = []
+        keys: list[tuple[int, tuple[Any, ...]]] = []
         specimens = specimens_of(measurements)
         number = 0
         for m in measurements:
@@ -146,10 +157,11 @@ class Cantilever:
                 table.append(np.stack(columns))
                 run_of.append(np.full(run.count, number, dtype=np.int64))
                 for length in columns[0]:
-                    key = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
+                    size = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
+                    key = (*size, m.rig.upside_down)
                     keys.append((specimens[number], key))
                     if key not in tows:
-                        tows[key] = HangingTow(*key)
+                        tows[key] = HangingTow(*size)
                 number += 1
         self._length, self._arc, x, self._observed = np.concatenate(table, axis=1)
         self._run = np.concatenate(run_of)
@@ -158,7 +170,13 @@ class Cantilever:
             rows = np.array([i for i, other in enumerate(keys) if other == own])
             self._specimens.append(
                 _Specimen(
-                    tows[own[1]], own[0], rows, self._arc[rows], x[rows], self._observed[rows]
+                    tows[own[1]],
+                    own[0],
+                    rows,
+                    self._arc[rows],
+                    x[rows],
+                    self._observed[rows],
+                    own[1][-1],
                 )
             )
 
@@ -233,7 +251,7 @@ class Cantilever:
     ) -> tuple[Array, dict[str, Array]]:
         """Heights [mm] and their derivatives; see Experiment."""
         strips = [v for v in variants if isinstance(v, StripVariant)]
-        laws = self._laws(strips)
+        laws = {turned: self._laws(strips, turned) for turned in (False, True)}
         names = [p.name for p in (*self.baseline, *(p for v in strips for p in v.parameters))]
         expected = np.zeros(len(self._run))
         slopes = {name: np.zeros(len(self._run)) for name in names}
@@ -242,7 +260,7 @@ class Cantilever:
             factors = {name: 1.0 + float(d[own.specimen]) for name, d in deviations.items()}
             mine = {name: value * factors.get(name, 1.0) for name, value in values.items()}
             key = (id(own.tow), *mine.values())
-            shape = shapes[key] = shapes.get(key) or own.tow.solve(mine, laws)
+            shape = shapes[key] = shapes.get(key) or own.tow.solve(mine, laws[own.upside_down])
             heights, changes = self._heights(own, shape.x, shape.z, shape.slopes)
             expected[own.rows] = heights
             for name, change in changes.items():
@@ -256,8 +274,11 @@ class Cantilever:
             SolveError: the model has no solution there.
         """
         mine = [v for v in variants if isinstance(v, StripVariant)]
-        laws = self._laws(mine)
-        shapes = [own.tow.solve(values, laws, slopes=False) for own in self._specimens]
+        laws = self._laws(mine, False)
+        shapes = [
+            own.tow.solve(values, self._laws(mine, own.upside_down), slopes=False)
+            for own in self._specimens
+        ]
         kappa = np.linspace(0.0, max(float(np.abs(s.curvature).max()) for s in shapes), LAW_POINTS)
         per_C1 = self.stiffness_per_C1
         moment, slopes = values["C1_MPa"] * per_C1 * kappa, {"C1_MPa": per_C1 * kappa}
@@ -311,9 +332,10 @@ class Cantilever:
             at[free] = s
         return at
 
-    def _laws(self, variants: Sequence[StripVariant]) -> Laws:
+    def _laws(self, variants: Sequence[StripVariant], upside_down: bool) -> Laws:
         def those(result: str, of: str) -> list[Marched]:
-            return [self._law(v, result, of) for v in variants if getattr(v, result) is not None]
+            mine = (v for v in variants if getattr(v, result) is not None)
+            return [self._law(v, result, of, upside_down) for v in mine]
 
         return Laws(
             moments=those("moment", "kappa"),
@@ -321,13 +343,19 @@ class Cantilever:
             slopes=those("slope", "root"),
         )
 
-    def _law(self, variant: StripVariant, result: str, of: str) -> Marched:
-        """One of a variant's expressions, with its derivatives."""
-        key = (variant, result)
+    def _law(self, variant: StripVariant, result: str, of: str, upside_down: bool) -> Marched:
+        """One of a variant's expressions, with its derivatives.
+
+        What belongs to the strip turns over with it: m(κ) becomes -m(-κ) and κ0 becomes -κ0.
+        """
+        turned = upside_down and result != "slope"
+        key = (variant, result, turned)
         if key not in self._compiled:
             law = Marched((of,), ("B", *(p.name for p in variant.parameters)))
-            given = (law.at,) if result == "unloaded" else (law.at, law.at[of])
-            self._compiled[key] = law.define({result: getattr(variant, result)(*given)}, {})
+            sign = -1.0 if turned else 1.0
+            given = (law.at,) if result == "unloaded" else (law.at, sign * law.at[of])
+            expression = sign * getattr(variant, result)(*given)
+            self._compiled[key] = law.define({result: expression}, {})
         return self._compiled[key]
 
 

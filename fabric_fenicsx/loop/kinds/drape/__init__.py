@@ -54,9 +54,6 @@ def _mistakes(rig: DrapeRig, columns: Mapping[str, Array]) -> Iterator[Mistake]:
         yield "std_deg", columns["std_deg"] <= 0.0, "more than 0"
 
 
-FORCES = "the same draw at two forces of the holder"
-QUADRANTS = "angles in all four quadrants of the sheet"
-
 DRAPE = Kind(
     name="drape",
     rig=DrapeRig,
@@ -74,16 +71,6 @@ DRAPE = Kind(
     experiment=called_later(f"{__name__}.model", "Drape"),
     made_up=called_later(f"{__name__}.made_up", "made_up"),
     options=("cells", "spacing", "model", "solve"),
-    further_tests={
-        ("holder_pressure", "tool_friction"): FORCES,
-        ("holder_pressure", "ply_rotation"): FORCES,
-        ("holder_pressure", "punch_offset"): FORCES,
-        ("ply_rotation", "punch_offset"): (
-            QUADRANTS + ": an offset makes opposite ones differ, a rotation neighbouring ones"
-        ),
-        ("ply_rotation", "tool_friction"): QUADRANTS + ": friction keeps their symmetry",
-        ("punch_offset", "tool_friction"): QUADRANTS + ": friction keeps their symmetry",
-    },
     needs_others=True,
     scattered=True,
 )

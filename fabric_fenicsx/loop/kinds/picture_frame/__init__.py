@@ -43,12 +43,6 @@ def _mistakes(rig: PictureFrameRig, columns: Mapping[str, Array]) -> Iterator[Mi
     yield "displacement_mm", closed, f"between {back:.4g} and {out:.4g}, where the frame is closed"
 
 
-TURN = "load, then unload over the same angles: friction changes its sign at the turn"
-RATES = "the same path at rates ten times apart"
-HOLD = "hold the crosshead still after loading, several times as long as the loading took"
-SIDES = "shear to both sides of the square: a force that is even in the angle keeps its sign there"
-STEEPER = "go further, and to several largest angles: locking depends on the angle alone"
-
 PICTURE_FRAME = Kind(
     name="picture_frame",
     rig=PictureFrameRig,
@@ -60,38 +54,6 @@ PICTURE_FRAME = Kind(
     mistakes=_mistakes,
     experiment=called_later(f"{__name__}.model", "PictureFrame"),
     made_up=called_later(f"{__name__}.made_up", "made_up"),
+    proposals=called_later(f"{__name__}.proposals", "proposals"),
     options=("rates",),
-    further_tests={
-        ("crossover_friction", "crosshead_backlash"): TURN + ", free travel only shifts the curve",
-        ("crossover_friction", "crossover_relaxation"): HOLD + ": friction keeps its force",
-        ("crossover_friction", "load_drift"): TURN + ", an offset does not",
-        ("crossover_friction", "rate_hardening"): RATES + ": friction does not depend on the rate",
-        ("crossover_friction", "shear_locking"): TURN + ", locking follows its own path back",
-        ("crossover_friction", "tension_coupling"): TURN + ", an elastic force does not",
-        ("crosshead_backlash", "crossover_relaxation"): HOLD + ": free travel does not relax",
-        ("crosshead_backlash", "load_drift"): (
-            "load to a large angle from rest: free travel shifts the curve along the angle, so "
-            "that its effect grows with the slope, an offset does not"
-        ),
-        ("crosshead_backlash", "rate_hardening"): RATES
-        + ": free travel does not depend on the rate",
-        ("crosshead_backlash", "shear_locking"): STEEPER,
-        ("crosshead_backlash", "tension_coupling"): SIDES,
-        ("crossover_relaxation", "load_drift"): (
-            HOLD
-            + ": relaxation levels off, a drift goes on; and read the unloaded frame at the end"
-        ),
-        ("crossover_relaxation", "rate_hardening"): HOLD + ": a dashpot's force vanishes at once",
-        ("crossover_relaxation", "shear_locking"): HOLD + ": locking does not relax",
-        ("crossover_relaxation", "tension_coupling"): HOLD + ": an elastic force does not relax",
-        ("load_drift", "rate_hardening"): RATES + ", and read the unloaded frame at rest",
-        ("load_drift", "shear_locking"): "read the unloaded frame before and after the test",
-        ("load_drift", "tension_coupling"): (
-            "read the unloaded frame before and after the test, and load it twice: an elastic "
-            "force is the same again, a drift has gone on"
-        ),
-        ("rate_hardening", "shear_locking"): RATES + ": locking does not depend on the rate",
-        ("rate_hardening", "tension_coupling"): RATES + ": an elastic force does not depend on it",
-        ("shear_locking", "tension_coupling"): SIDES,
-    },
 )

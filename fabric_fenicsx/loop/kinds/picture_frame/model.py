@@ -28,7 +28,7 @@ from ....mechanics.laws.law import Crossing
 from ....mechanics.laws.springs import PolynomialSpring
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, Variant, scaled
+from ...inference.effects import Effect, Variant, of_run, scaled
 from ...inference.experiment import NO_DEVIATIONS, Deviations, OneCurve
 from ...inference.noise import estimated_noise
 from ...measurement.readings import common_noise, readings_of
@@ -58,13 +58,19 @@ class PictureFrame:
     Args:
         measurements: folders of this test; they share the parameters of the fabric.
         own: effects of the user's.
+        like: other frames, whose compiled expressions serve these too.
     """
 
     test = "picture_frame"
     quantity = "force_N"
     notes = ()
 
-    def __init__(self, measurements: Sequence[Measurement], own: Sequence[Effect] = ()) -> None:
+    def __init__(
+        self,
+        measurements: Sequence[Measurement],
+        own: Sequence[Effect] = (),
+        like: PictureFrame | None = None,
+    ) -> None:
         self.noise = common_noise(measurements)
         self.baseline: tuple[Parameter, ...] = BASELINE
         runs = [(m, run) for m in measurements for run in m.runs]
@@ -79,7 +85,7 @@ class PictureFrame:
             "frame": Varying(np.array([[m.rig.frame_length_mm for m, _ in runs]])),
             "fabric": Varying(np.array([[m.rig.fabric_length_mm for m, _ in runs]])),
         }
-        self._compiled: dict[Any, Marched] = {}
+        self._compiled: dict[Any, Marched] = {} if like is None else like._compiled
         kinematics = self._kinematics(self._travel(None, {}), {})
         gamma, rate = (self._at_readings(kinematics[key].value) for key in ("gamma", "rate"))
         time = self._at_readings(self._points["time"].value)
@@ -320,10 +326,8 @@ class PictureFrame:
         def expanded(v: Variant) -> Variant:
             if not (isinstance(v, FrameVariant) and v.each_run):
                 return v
-            own = ((p, int(run)) for run in runs for p in v.parameters)
-            return replace(
-                v, parameters=tuple(replace(p, name=_of_run(p, run), run=run) for p, run in own)
-            )
+            own = tuple(of_run(p, int(run)) for run in runs for p in v.parameters)
+            return replace(v, parameters=own)
 
         each = [v for v in effect.variants if getattr(v, "each_run", False)]
         shared = [v for v in effect.variants if v not in each]
@@ -368,11 +372,6 @@ class PictureFrame:
                 zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
                 total[:, run] = sum(z * c for z, c in zip(zero, own.values(), strict=True))
         return Varying(total, found)
-
-
-def _of_run(p: Parameter, run: int) -> str:
-    """Name of a parameter in one run, counted from 1."""
-    return f"run{run + 1}_{p.name}"
 
 
 def _remembered(marched: Marched, number: int, name: str) -> Any:
