@@ -36,6 +36,8 @@ Flags = npt.NDArray[np.bool_]
 
 #: Units in which variances are looked for: (a tenth)² of a parameter, (2 %)² of a reading.
 SCATTER_UNIT, SHARE_UNIT = 0.01, 4e-4
+#: Gain of −2 log likelihood in a step below which it is the last one.
+ENOUGH = 1e-4
 #: Step of a difference quotient.
 DIFFERENCE = 1e-5
 #: Products of columns that are kept, for different correlations and shares.
@@ -123,13 +125,14 @@ def estimate(
     bounds: list[tuple[float, float]] = [(-4.0, 4.0), (0.0, correlated), (0.0, 100.0)]
     bounds += [(0.0, 100.0)] * len(groups) + [(0.0, 1e6)] * smooth
     x0 = np.clip(begin, [low for low, _ in bounds], [high for _, high in bounds])
+    problem.origin = problem.cost(x0)[0]
     found = minimize(
         problem.with_slope,
         x0,
         method="L-BFGS-B",
         jac=True,
         bounds=bounds,
-        options={"maxiter": 60, "ftol": 1e-6},
+        options={"maxiter": 60, "ftol": ENOUGH},
     )
     restricted, likelihood = problem.cost(found.x)
     noise, taus, omega = problem.split(found.x)
@@ -153,7 +156,7 @@ class _Problem:
         self, at: Linearised, given: float | None, smooth: bool, usual_scatter: float
     ) -> None:
         self._at, self._given, self._usual = at, given, usual_scatter
-        self.floor = 1.0
+        self.floor, self.origin = 1.0, 0.0
         self._smooth = smooth
         norms = np.linalg.norm(at.common, axis=0)
         common = at.common / np.where(norms > 0.0, norms, 1.0)
@@ -204,11 +207,11 @@ class _Problem:
         return rest + whole, rest + random
 
     def with_slope(self, x: Array) -> tuple[float, Array]:
-        """The restricted one with its derivatives, by differences."""
+        """The restricted one from its value at the start, with its derivatives, by differences."""
         value = self.cost(x)[0]
         step = DIFFERENCE * np.maximum(1.0, np.abs(x))
         moved = x + np.diag(step)
-        return value, np.array([self.cost(at)[0] - value for at in moved]) / step
+        return value - self.origin, np.array([self.cost(at)[0] - value for at in moved]) / step
 
     def white(self, x: Array) -> Array:
         """Residual that is left with the specimens' deviations, but without smooth lines, white."""
