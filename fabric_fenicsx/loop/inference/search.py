@@ -13,13 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis, Pair, Verdict
 from .effects import Effect
 from .experiment import Experiment
-from .fitting import Fit, fit
+from .fitting import Fit, fit, parameters_of
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise, quantum
 from .screen import Screen
@@ -136,7 +138,6 @@ class _Search:
         final = chosen if verdict == "effect_found" else baseline
         if final.effects:
             final = self._final(final)
-        # Strongest first: without it the criterion would be worst.
         self.progress(0.9, "rivals")
         judged = final if verdict != "unexplained" else nearest
         misfit = self.judge.misfit(judged)
@@ -156,7 +157,7 @@ class _Search:
             baseline=baseline.fit,
             final=final.fit,
             best=nearest.fit if verdict == "unexplained" and nearest.effects else None,
-            effects=final.effects,
+            effects=self._by_strength(final),
             rivals=rivals,
             pairs=self._pairs(final, rivals, of_the_curve),
             candidates=candidates,
@@ -309,6 +310,21 @@ class _Search:
             evaluations=CRITERIA.final_evaluations,
         )
         return self.judge.weighed(fitted, model.effects)
+
+    def _by_strength(self, model: Model) -> tuple[Effect, ...]:
+        """Effects of a model, that first which changes the expected readings most."""
+
+        def change(effect: Effect) -> float:
+            kept = [v for v in model.fit.variants if v not in effect.variants]
+            names = {p.name for p in parameters_of(self.experiment, kept)}
+            values = {name: value for name, value in model.fit.values.items() if name in names}
+            without, _ = self.experiment.predict(kept, values)
+            alike, _ = self.experiment.predict(model.fit.variants, model.fit.values)
+            return float(np.sum((alike - without)[model.fit.used] ** 2))
+
+        if len(model.effects) < 2:
+            return model.effects
+        return tuple(sorted(model.effects, key=change, reverse=True))
 
     # Choice -------------------------------------------------------------------------------
 
