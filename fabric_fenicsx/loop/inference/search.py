@@ -286,20 +286,27 @@ class _Search:
         return model
 
     def _best_refined(self, models: list[Model]) -> list[Model]:
-        """Models, the best of which were fitted again, the best first."""
-        models = sorted(models, key=lambda m: m.criterion)
-        if not models:
-            return []
-        near = [
-            k
-            for k, m in enumerate(models)
-            if k < REFINED and m.criterion < models[0].criterion + REFINED_WITHIN
-        ]
-        models[: len(near)] = [self._refined(m) for m in models[: len(near)]]
-        return sorted(models, key=lambda m: m.criterion)
+        """Models, the best first; the best of each set of effects was fitted again.
+
+        A model is only compared as the best when its parameters go with its own variances.
+        """
+        refined: list[Model] = []
+        rest = sorted(models, key=lambda m: m.criterion)
+        while rest:
+            best = min((m.criterion for m in refined), default=float("inf"))
+            if len(refined) >= REFINED and rest[0].criterion >= best:
+                break
+            if rest[0].criterion > best + REFINED_WITHIN or len(refined) >= 2 * REFINED:
+                break
+            model = self._refined(rest.pop(0))
+            # Another start that leads to the same place.
+            same = [m for m in rest if m.fit.variants == model.fit.variants]
+            rest = [m for m in rest if m not in same or m.criterion < model.criterion - 1.0]
+            refined.append(model)
+        return sorted(refined, key=lambda m: m.criterion) + rest
 
     def _final(self, model: Model) -> Model:
-        """The model as it is reported, its effects the strongest first."""
+        """The model as it is reported."""
         fitted = fit(
             self.experiment,
             model.fit.variants,

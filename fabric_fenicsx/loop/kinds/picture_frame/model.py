@@ -108,6 +108,8 @@ class PictureFrame:
             "duration": max(float(p.time[-1] - p.time[0]) for p in motions),
             "angle": float(np.abs(gamma).max()),
             "rate": float(np.abs(rate).max()),
+            "force": float(np.abs(self.readings.observed).max()),
+            "typical_rate": _typical(np.abs(rate)),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
         self.effects = [self._with_runs(scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
@@ -372,6 +374,12 @@ class PictureFrame:
                 zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
                 total[:, run] = sum(z * c for z, c in zip(zero, own.values(), strict=True))
         return Varying(total, found)
+
+
+def _typical(rate: Array) -> float:
+    """Median of the rates [rad/s] while the frame moves."""
+    moving = rate[rate > 1e-6 * float(rate.max())]
+    return float(np.median(moving)) if len(moving) else 1.0
 
 
 def _remembered(marched: Marched, number: int, name: str) -> Any:
