@@ -216,6 +216,7 @@ class _Search:
             self._use(best.fit)
             self._base = self._baseline(self._base.values)
             levels.append(self._together(count))
+            self._with_one_less(levels)
         return candidates, [level for level in levels if level]
 
     def _screened(self) -> Screen:
@@ -228,6 +229,26 @@ class _Search:
         combinations = self._screened().best(CRITERIA.combinations, count)
         fits = self._fitted(combinations, starts=1)
         return self._best_refined(self._weighed([(f, self._effects_of(f)) for f in fits]))
+
+    def _with_one_less(self, levels: list[list[Model]]) -> None:
+        """The best model of the last level without each of its effects, among those before it.
+
+        Together with others an effect may have come out in a form that was not tried alone.
+        """
+        if not levels[-1]:
+            return
+        best = levels[-1][0].fit
+        found = []
+        for out in best.variants:
+            kept = tuple(v for v in best.variants if v is not out)
+            variances = self.variances
+            try:
+                found.append(fit(self.experiment, kept, best.values, best.used, variances))
+            except SolveError:
+                continue
+        tried = {m.fit.variants for m in levels[-2]}
+        new = [(f, self._effects_of(f)) for f in found if f.variants not in tried]
+        levels[-2] = self._best_refined([*levels[-2], *self._weighed(new)])
 
     @property
     def _robust(self) -> float:
