@@ -55,7 +55,7 @@ def test_a_gap_is_as_many_steps_as_were_left_out():
 
 
 def test_simulated_noise_comes_out_white():
-    """What is drawn from the model and made white passes the tests of whiteness as often as told."""
+    """Drawn from the model and made white it fails a test as often as its chance says."""
     rng = np.random.default_rng(3)
     run = np.repeat([0, 1, 2], 60)
     least = []

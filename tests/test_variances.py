@@ -180,7 +180,7 @@ def test_columns_that_are_alike_and_huge_have_a_likelihood():
 
 
 def test_estimates_with_found_components_are_as_far_off_as_they_say():
-    """z over 60 sets of eight specimens: about t of 7, whose sigma is 1.18; 1.96 holds 91 %."""
+    """Over 60 sets of eight specimens z is about t of 7, whose sigma is 1.18; 1.96 holds 91 %."""
     z = []
     for seed in range(60):
         at = example(1000 + seed, 8, 30, 0.1)
