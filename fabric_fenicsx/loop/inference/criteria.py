@@ -82,7 +82,7 @@ class Criteria:
     near: float = 1.15
     settled: float = 1.03
     scatter: float = 1.25
-    usual_scatter: float = 0.12
+    usual_scatter: float = 0.1
     laboratories: float = 0.6
     usual_share: float = 0.05
     stated_within: float = 0.15
