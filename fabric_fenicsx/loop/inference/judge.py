@@ -118,12 +118,14 @@ class Judge:
         return self._readings.holdout & self._readings.usable & ~self.outliers
 
     def leave_out(self, model: Fit) -> bool:
-        """Leave out readings that stand out from a model; whether they are others than before."""
+        """Leave out readings that stand out from a model; whether others are fitted than before."""
         z = model.residual / model.variances.noise.sigma(self._readings)
-        usable = self._readings.usable
-        found = outliers(z, self._readings, usable)
-        found |= missed_readings(z, self._readings, usable & ~found)
-        changed = bool((found != self.outliers).any())
+        readings = self._readings
+        found = outliers(z, readings, readings.usable)
+        # What is held out has no say in what the others are judged by.
+        for rows in (readings.fit, readings.holdout & readings.usable):
+            found |= missed_readings(z, readings, rows & ~found)
+        changed = bool((found != self.outliers)[readings.fit].any())
         self.outliers = found
         return changed
 

@@ -199,7 +199,7 @@ class _Problem:
         M[np.arange(p + q), np.arange(p + q)] *= 1.0 + 1e-12
         by = G[:-1, -1] * scale / noise.floor
         factor = np.linalg.cholesky(M)
-        half = solve_triangular(factor, by, lower=True, check_finite=False)
+        half = solve_triangular(factor, by, lower=True, check_finite=False) if len(M) else by
         chi = float(G[-1, -1]) / noise.floor**2 - float(half @ half)
         whole = 2.0 * float(np.sum(np.log(np.diag(factor))))
         part = np.linalg.cholesky(M[p:, p:]) if q else np.ones((1, 1))

@@ -118,6 +118,8 @@ class PictureFrame:
     def _start(self) -> None:
         """Begin fits of the baseline with its least squares, which are linear."""
         rows = self.readings.fit
+        if rows.sum() <= len(self.baseline):
+            return
         _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
         J = np.column_stack([slopes[p.name][rows] for p in self.baseline])
         scale = np.linalg.norm(J, axis=0)
