@@ -21,7 +21,8 @@ from test_drape_loop import angle, made_up, marks, written
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.loop.kinds.drape import model as drape
 from fabric_fenicsx.loop.kinds.drape.model import Drape
-from fabric_fenicsx.loop.report.content import SCHEMA, parameter_unit
+from fabric_fenicsx.loop.report.content import SCHEMA
+from fabric_fenicsx.loop.report.words import parameter_unit
 
 RECIPES = {recipe.name: recipe for recipe in sixty(1)}
 #: One set of each verdict, with the effects in it.
@@ -118,7 +119,7 @@ def test_the_page_stands_by_itself(diagnosed, name):
     text = (out / "report.html").read_text()
     page = Images()
     page.feed(text)
-    kinds = ("data", "residuals", "candidates")
+    kinds = ("data", "residuals", "dependence", "noise", "candidates")
     assert len(page.images) == len(page.loaded) == len(kinds)
     assert "url(" not in text and "@import" not in text
     for source in page.images:

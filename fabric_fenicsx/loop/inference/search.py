@@ -168,6 +168,8 @@ class _Search:
             white_before=self.judge.misfit(baseline).whiteness,
             white_after=self.judge.misfit(final).whiteness,
             outliers=self.judge.outliers,
+            criterion_before=baseline.criterion,
+            criterion_after=final.criterion,
             curve=curve,
             of_the_curve=of_the_curve,
             laboratories=tuple(self.judge.laboratories(judged.fit, misfit.noise)),
@@ -198,10 +200,11 @@ class _Search:
             own = [((v, s),) for v, shapes in signs[candidate.effect].items() for s in shapes]
             found += [(f, (candidate.effect,)) for f in self._fitted(own, starts=2)]
         singles = self._weighed(found)
-        for candidate in candidates:
-            mine = [m for m in singles if m.effects == (candidate.effect,)]
-            candidate.fit = mine[0].fit if mine else None
         levels.append(self._best_refined(singles))
+        for candidate in candidates:
+            mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
+            if mine:
+                candidate.fit, candidate.criterion = mine[0].fit, mine[0].criterion
         for count in range(2, CRITERIA.most_effects + 1):
             best = min((m for level in levels for m in level), key=lambda m: m.criterion)
             if (
