@@ -19,7 +19,8 @@ class Parameter:
         amplitude: whether it is the strength of an effect, zero in the baseline.
         meaning: one line for the report.
         share_of: "duration", "angle", "rate" or "travel": starts and bounds are shares of the
-            longest run, or of the largest shear angle, rate or displacement in the data; of a
+            longest run, or of the largest shear angle, rate or displacement in the data;
+            "typical_rate": of the median rate; "force": of the largest reading; of a
             cantilever "curvature" or "moment", the largest of them in the fitted baseline.
         jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
             for on both sides.

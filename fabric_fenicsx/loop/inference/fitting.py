@@ -9,7 +9,7 @@ scatter by (see variances): the mode of a mixed-effects model. Where τ is nothi
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -386,22 +386,6 @@ def linearised(experiment: Experiment, model: Fit) -> Linearised:
         specimens[group] = (whole[:, None] * (specimen[:, None] == everyone))[rows]
     return Linearised(
         residual, model.slopes[:, :count][:, free][rows], specimens, model.readings, rows
-    )
-
-
-def without(experiment: Experiment, model: Fit, variants: Sequence[Variant]) -> Fit:
-    """A fitted model with some effects taken out and its other parameters left as they are."""
-    kept = tuple(v for v in model.variants if v not in variants)
-    names = [p.name for p in parameters_of(experiment, kept)]
-    values = {name: model.values[name] for name in names}
-    expected, _ = experiment.predict(kept, values)
-    return replace(
-        model,
-        variants=kept,
-        values=values,
-        std={name: model.std[name] for name in names},
-        residual=experiment.readings.observed - expected,
-        expected=expected,
     )
 
 

@@ -13,13 +13,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis, Pair, Verdict
 from .effects import Effect
 from .experiment import Experiment
-from .fitting import Fit, fit
+from .fitting import Fit, fit, parameters_of
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise, quantum
 from .screen import Screen
@@ -136,7 +138,6 @@ class _Search:
         final = chosen if verdict == "effect_found" else baseline
         if final.effects:
             final = self._final(final)
-        # Strongest first: without it the criterion would be worst.
         self.progress(0.9, "rivals")
         judged = final if verdict != "unexplained" else nearest
         misfit = self.judge.misfit(judged)
@@ -156,7 +157,7 @@ class _Search:
             baseline=baseline.fit,
             final=final.fit,
             best=nearest.fit if verdict == "unexplained" and nearest.effects else None,
-            effects=final.effects,
+            effects=self._by_strength(final),
             rivals=rivals,
             pairs=self._pairs(final, rivals, of_the_curve),
             candidates=candidates,
@@ -218,6 +219,7 @@ class _Search:
             self._use(best.fit)
             self._base = self._baseline(self._base.values)
             levels.append(self._together(count))
+            self._with_one_less(levels)
         return candidates, [level for level in levels if level]
 
     def _screened(self) -> Screen:
@@ -230,6 +232,26 @@ class _Search:
         combinations = self._screened().best(CRITERIA.combinations, count)
         fits = self._fitted(combinations, starts=1)
         return self._best_refined(self._weighed([(f, self._effects_of(f)) for f in fits]))
+
+    def _with_one_less(self, levels: list[list[Model]]) -> None:
+        """The best model of the last level without each of its effects, among those before it.
+
+        Together with others an effect may have come out in a form that was not tried alone.
+        """
+        if not levels[-1]:
+            return
+        best = levels[-1][0].fit
+        found = []
+        for out in best.variants:
+            kept = tuple(v for v in best.variants if v is not out)
+            variances = self.variances
+            try:
+                found.append(fit(self.experiment, kept, best.values, best.used, variances))
+            except SolveError:
+                continue
+        tried = {m.fit.variants for m in levels[-2]}
+        new = [(f, self._effects_of(f)) for f in found if f.variants not in tried]
+        levels[-2] = self._best_refined([*levels[-2], *self._weighed(new)])
 
     @property
     def _robust(self) -> float:
@@ -288,20 +310,27 @@ class _Search:
         return model
 
     def _best_refined(self, models: list[Model]) -> list[Model]:
-        """Models, the best of which were fitted again, the best first."""
-        models = sorted(models, key=lambda m: m.criterion)
-        if not models:
-            return []
-        near = [
-            k
-            for k, m in enumerate(models)
-            if k < REFINED and m.criterion < models[0].criterion + REFINED_WITHIN
-        ]
-        models[: len(near)] = [self._refined(m) for m in models[: len(near)]]
-        return sorted(models, key=lambda m: m.criterion)
+        """Models, the best first; the best of each set of effects was fitted again.
+
+        A model is only compared as the best when its parameters go with its own variances.
+        """
+        refined: list[Model] = []
+        rest = sorted(models, key=lambda m: m.criterion)
+        while rest:
+            best = min((m.criterion for m in refined), default=float("inf"))
+            if len(refined) >= REFINED and rest[0].criterion >= best:
+                break
+            if rest[0].criterion > best + REFINED_WITHIN or len(refined) >= 2 * REFINED:
+                break
+            model = self._refined(rest.pop(0))
+            # Another start that leads to the same place.
+            same = [m for m in rest if m.fit.variants == model.fit.variants]
+            rest = [m for m in rest if m not in same or m.criterion < model.criterion - 1.0]
+            refined.append(model)
+        return sorted(refined, key=lambda m: m.criterion) + rest
 
     def _final(self, model: Model) -> Model:
-        """The model as it is reported, its effects the strongest first."""
+        """The model as it is reported."""
         fitted = fit(
             self.experiment,
             model.fit.variants,
@@ -312,6 +341,21 @@ class _Search:
             evaluations=CRITERIA.final_evaluations,
         )
         return self.judge.weighed(fitted, model.effects)
+
+    def _by_strength(self, model: Model) -> tuple[Effect, ...]:
+        """Effects of a model, that first which changes the expected readings most."""
+
+        def change(effect: Effect) -> float:
+            kept = [v for v in model.fit.variants if v not in effect.variants]
+            names = {p.name for p in parameters_of(self.experiment, kept)}
+            values = {name: value for name, value in model.fit.values.items() if name in names}
+            without, _ = self.experiment.predict(kept, values)
+            alike, _ = self.experiment.predict(model.fit.variants, model.fit.values)
+            return float(np.sum((alike - without)[model.fit.used] ** 2))
+
+        if len(model.effects) < 2:
+            return model.effects
+        return tuple(sorted(model.effects, key=change, reverse=True))
 
     # Choice -------------------------------------------------------------------------------
 

@@ -22,6 +22,17 @@ ROUNDING = Parameter(
     meaning="rate below which the friction falls off",
     share_of="rate",
 )
+# Friction has its moment at the usual rates of a test: what saturates among them is a dashpot.
+SHARP = replace(ROUNDING, upper=0.2, starts=(5e-3, 0.05), share_of="typical_rate")
+SLOW = Parameter(
+    "saturation_rad_s",
+    (0.1, 1.0),
+    0.05,
+    20.0,
+    meaning="rate at which the dashpot's moment saturates",
+    share_of="typical_rate",
+)
+VISCOUS = replace(LIMIT, meaning="largest moment per area of a dashpot that saturates")
 GROWTH = Parameter("growth_1_rad", (1.0,), 0.0, 50.0, meaning="of m_c, with the angle")
 
 
@@ -54,10 +65,22 @@ class SlidingFriction(CrossingLaw):
             "crossover_friction",
             "sliding, rounded twice",
             tuple(
-                {"limit": replace(LIMIT, name=f"m_c{k}_N"), "rounding": Times(r, ROUNDING)}
+                {"limit": replace(LIMIT, name=f"m_c{k}_N"), "rounding": Times(r, SHARP)}
                 for k, r in ((1, 1.0), (2, 6.0))
             ),
             rank=6,
+        ),
+        Form(
+            "rate_hardening",
+            "saturating",
+            tuple(
+                {
+                    "limit": replace(VISCOUS, name=f"m_v{k}_N"),
+                    "rounding": Times(r, SLOW),
+                }
+                for k, r in ((1, 1.0), (2, 6.0))
+            ),
+            rank=4,
         ),
     )
 

@@ -24,7 +24,9 @@ OF_THE_LAW = {
 }
 """What laws of a crossing may be forms of; the forms stand with the laws."""
 
-OFFSET = Parameter("offset_N", amplitude=True, meaning="reading at no load")
+OFFSET = Parameter(
+    "offset_N", (), -1.0, 1.0, amplitude=True, meaning="reading at no load", share_of="force"
+)
 DRIFT = Parameter("drift_N_s", amplitude=True, meaning="change of the reading per second")
 TRAVEL = Parameter(
     "free_travel_mm",

@@ -40,6 +40,7 @@ from .variant import FrameVariant
 __all__ = ["PictureFrame"]
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 BASELINE = (
     Parameter("k1_N", (0.0,), 0.0, meaning="spring, moment per area and angle"),
@@ -108,6 +109,8 @@ class PictureFrame:
             "duration": max(float(p.time[-1] - p.time[0]) for p in motions),
             "angle": float(np.abs(gamma).max()),
             "rate": float(np.abs(rate).max()),
+            "force": float(np.abs(self.readings.observed).max()),
+            "typical_rate": _typical(np.abs(rate)),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
         self.effects = [self._with_runs(scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
@@ -228,17 +231,28 @@ class PictureFrame:
                 slopes[p] = slopes.get(p, 0.0) + slope * factor.value
             for p, slope in factor.slopes.items():
                 slopes[p] = slopes.get(p, 0.0) + m.value * slope
+        zeros: list[tuple[Flags, Array]] = []
         for v in mine:
             if v.reading is not None:
-                added = self._each_run(v, values, force) if v.each_run else self._reading(v, values)
+                if v.each_run:
+                    added, own_zeros = self._each_run(v, values, force)
+                    zeros += own_zeros
+                else:
+                    added = self._reading(v, values)
                 force = force + added.value
                 for p, slope in added.slopes.items():
                     slopes[p] = slopes.get(p, 0.0) + slope
         names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
         zero = np.zeros(len(self._place[0]))
-        return self._at_readings(force), {
+        found = {
             name: self._at_readings(slopes[name]) if name in slopes else zero for name in names
         }
+        for rows, J in zeros:
+            # What a zero taken from the readings makes up for.
+            for name, slope in found.items():
+                found[name] = slope.copy()
+                found[name][rows] -= J @ np.linalg.lstsq(J, slope[rows], rcond=None)[0]
+        return self._at_readings(force), found
 
     def _travel(self, variant: FrameVariant | None, values: Mapping[str, float]) -> Any:
         """True displacement of the frame, and its rate."""
@@ -340,8 +354,12 @@ class PictureFrame:
 
     def _each_run(
         self, variant: FrameVariant, values: Mapping[str, float], force: Array
-    ) -> Varying:
-        """What the load cell adds; in a run that is not fitted, what fits best to what is left."""
+    ) -> tuple[Varying, list[tuple[Flags, Array]]]:
+        """What the load cell adds; in a run that is not fitted, what fits best to what is left.
+
+        Also the readings of such runs, flags, and the columns that were fitted to them.
+        """
+        zeros = []
         assert variant.reading is not None
         names = dict.fromkeys(p.name.split("_", 1)[1] for p in variant.parameters)
         # The form's, not the variant's, which may have parameters of fewer runs.
@@ -370,8 +388,15 @@ class PictureFrame:
                     [self._at_readings(np.broadcast_to(c, shape))[rows] for c in columns.values()]
                 )
                 zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
+                zeros.append((rows, J))
                 total[:, run] = sum(z * c for z, c in zip(zero, own.values(), strict=True))
-        return Varying(total, found)
+        return Varying(total, found), zeros
+
+
+def _typical(rate: Array) -> float:
+    """Median of the rates [rad/s] while the frame moves."""
+    moving = rate[rate > 1e-6 * float(rate.max())]
+    return float(np.median(moving)) if len(moving) else 1.0
 
 
 def _remembered(marched: Marched, number: int, name: str) -> Any:
