@@ -67,25 +67,33 @@ def smooth_curve(
     several = len(np.unique(specimen)) > 1
     everyone = np.arange(len(readings.specimens))
     groups = {"shape": 10.0 * size * factor[:, None] * _bends(x, low, high, pieces)}
-    if several:
-        groups["specimens"] = y[:, None] * (specimen[:, None] == everyone)
     common = factor[:, None] * np.column_stack([np.ones_like(x), x])
     at = Linearised(y, common, groups, readings, rows)
-    found = estimate(at, start, given=given, usual_scatter=np.inf).variances
-    whiten = found.noise.whitener(readings, rows)
-    scale = np.concatenate(
-        [np.ones(2), *(np.full(g.shape[1], found.scatter[n]) for n, g in groups.items())]
-    )
-    A = whiten(np.concatenate([common, *groups.values()], axis=1)) * scale
-    penalty = np.diag((np.arange(A.shape[1]) >= 2).astype(float))
-    covariance = np.linalg.pinv(A.T @ A + penalty, hermitian=True)
-    solution = covariance @ (A.T @ whiten(y))
+    solution, covariance, scale = _solved(at, start, given)
+    if several:
+        # By the curve of all, not by their own readings, which explain themselves.
+        all_alike = np.concatenate([common, groups["shape"]], axis=1) @ (scale * solution)
+        groups["specimens"] = all_alike[:, None] * (specimen[:, None] == everyone)
+        solution, covariance, scale = _solved(at, start, given)
     grid = np.linspace(low, high, POINTS)
     shown = np.column_stack([np.ones(POINTS), grid, 10.0 * size * _bends(grid, low, high, pieces)])
     kept = shown.shape[1]
     shown = shown * scale[:kept]
     std = np.sqrt(np.einsum("ni,ij,nj->n", shown, covariance[:kept, :kept], shown))
     return Curve(known.x, known.y, grid, shown @ solution[:kept], std)
+
+
+def _solved(at: Linearised, start: Variances, given: float | None) -> tuple[Array, Array, Array]:
+    """Estimates with the components that are found, their covariance, and their units."""
+    found = estimate(at, start, given=given, usual_scatter=np.inf).variances
+    whiten = found.noise.whitener(at.readings, at.rows)
+    groups = at.specimens.items()
+    random = [np.full(columns.shape[1], found.scatter[name]) for name, columns in groups]
+    scale = np.concatenate([np.ones(at.common.shape[1]), *random])
+    A = whiten(np.concatenate([at.common, *at.specimens.values()], axis=1)) * scale
+    penalty = np.diag((np.arange(A.shape[1]) >= at.common.shape[1]).astype(float))
+    covariance = np.linalg.pinv(A.T @ A + penalty, hermitian=True)
+    return covariance @ (A.T @ whiten(at.residual)), covariance, scale
 
 
 def _bends(x: Array, low: float, high: float, pieces: int) -> Array:

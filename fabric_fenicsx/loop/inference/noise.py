@@ -224,7 +224,7 @@ def whiteness(
     """
     size = float(chi2.sf(np.sum(white**2), max(len(white) - parameters, 1))) if given else 1.0
     sums, blocks = 0.0, 0
-    lags, terms, periods = 0.0, 0, 1.0
+    lags, terms, highest, searched = 0.0, 0, 0.0, 0
     run_of = readings.run[rows]
     for run in range(len(readings.names)):
         own = white[run_of == run]
@@ -245,11 +245,12 @@ def whiteness(
             frequencies = 2.0 * np.pi * np.arange(n // 8, n // 2) / n
             power = lombscargle(np.arange(n, dtype=float), centred, frequencies)
             peak = float(power.max()) / (variance / n)
-            periods = min(periods, 1.0 - (1.0 - np.exp(-min(peak, 700.0))) ** len(frequencies))
+            highest = max(highest, peak)
+            searched += len(frequencies)
     return Whiteness(
         size=size,
         blocks=float(chi2.sf(sums, max(blocks, 1))) if blocks else 1.0,
         lags=float(chi2.sf(lags, max(terms, 1))) if terms else 1.0,
-        period=periods,
+        period=float(1.0 - (1.0 - np.exp(-min(highest, 700.0))) ** searched) if searched else 1.0,
         smooth=smooth,
     )

@@ -122,8 +122,9 @@ def estimate(
     begin += [s**2 / SCATTER_UNIT for s in scatter] + [1.0] * smooth
     problem.floor = start.noise.floor
     correlated = problem.most_correlated
-    bounds: list[tuple[float, float]] = [(-4.0, 4.0), (0.0, correlated), (0.0, 100.0)]
-    bounds += [(0.0, 100.0)] * len(groups) + [(0.0, 1e6)] * smooth
+    # Were all bounds finite, the first step would be the whole gradient: into a corner of them.
+    bounds: list[tuple[float, float]] = [(-4.0, 4.0), (0.0, correlated), (0.0, np.inf)]
+    bounds += [(0.0, np.inf)] * (len(groups) + smooth)
     x0 = np.clip(begin, [low for low, _ in bounds], [high for _, high in bounds])
     problem.origin = problem.cost(x0)[0]
     found = minimize(
@@ -194,7 +195,8 @@ class _Problem:
         q = len(scale) - p
         M = G[:-1, :-1] * np.outer(scale, scale)
         M[np.arange(p, p + q), np.arange(p, p + q)] += 1.0
-        M[np.arange(p), np.arange(p)] *= 1.0 + 1e-12
+        # Columns that are alike to round-off, however large, keep it positive.
+        M[np.arange(p + q), np.arange(p + q)] *= 1.0 + 1e-12
         by = G[:-1, -1] * scale / noise.floor
         factor = np.linalg.cholesky(M)
         half = solve_triangular(factor, by, lower=True, check_finite=False)

@@ -1,0 +1,79 @@
+"""The model of noise: readings made white, against the covariance written out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from linear import covariance, drawn, readings
+
+from fabric_fenicsx.loop.inference.noise import Noise, estimated_noise, whiteness
+
+NOISE = Noise(floor=0.3, share=0.2, correlation=0.7)
+
+
+def lines(model_error=False):
+    """Three lines of readings of different weight, some left out: in a row, at an end, a whole."""
+    rng = np.random.default_rng(1)
+    run = np.repeat([0, 1, 2], [9, 8, 7])
+    weight = rng.uniform(0.5, 2.0, 24)
+    error = rng.normal(size=(24, 3)) if model_error else None
+    data = readings(rng.normal(2.0, 1.0, 24), run=run, weight=weight, model_error=error)
+    rows = np.ones(24, dtype=bool)
+    rows[[2, 3, 4, 8, 12, 17]] = False
+    return data, rows
+
+
+@pytest.mark.parametrize("model_error", [False, True])
+@pytest.mark.parametrize("noise", [NOISE, Noise(0.3), Noise(0.01, 0.3, 0.0), Noise(0.3, 0.0, 0.9)])
+def test_the_whitener_is_a_root_of_the_inverse_covariance(noise, model_error):
+    data, rows = lines(model_error)
+    whiten = noise.whitener(data, rows)
+    V = covariance(data, rows, noise)
+    W = whiten(np.eye(len(V)))
+    assert W @ V @ W.T == pytest.approx(np.eye(len(V)), abs=1e-9)
+    assert whiten.log_determinant == pytest.approx(np.linalg.slogdet(V)[1], rel=1e-10)
+    y = np.random.default_rng(2).normal(size=len(V))
+    assert whiten(y) == pytest.approx(W @ y, rel=1e-10)
+    if not model_error:
+        # Causal: the inverse of the Cholesky factor, so that each reading is foretold from those
+        # before it.
+        assert pytest.approx(np.linalg.inv(np.linalg.cholesky(V)), abs=1e-9) == W
+
+
+def test_a_gap_is_as_many_steps_as_were_left_out():
+    """Readings a, b with k left out between them are correlated by φ^(k + 1)."""
+    data, rows = lines()
+    rows[:] = False
+    rows[[0, 4]] = True
+    noise = Noise(2.0, 0.0, 0.8)
+    data = replace(data, weight=np.ones(24))
+    W = noise.whitener(data, rows)(np.eye(2))
+    phi = 0.8**4
+    exact = np.array([[1.0, 0.0], [-phi, 1.0]]) / 2.0
+    exact[1] /= np.sqrt(1.0 - phi**2)
+    assert pytest.approx(exact, rel=1e-12) == W
+
+
+def test_simulated_noise_comes_out_white():
+    """Drawn from the model and made white it fails a test as often as its chance says."""
+    rng = np.random.default_rng(3)
+    run = np.repeat([0, 1, 2], 60)
+    least = []
+    for _ in range(200):
+        data = readings(rng.normal(5.0, 2.0, 180), run=run)
+        every = np.ones(180, dtype=bool)
+        white = NOISE.whitener(data, every)(drawn(data, NOISE, rng))
+        tests = whiteness(white, True, 0, data, every)
+        least.append([tests.size, tests.blocks, tests.lags, tests.period])
+    # A tenth of 200 chances lies below 0.1, give or take 0.02.
+    assert np.mean(np.array(least) < 0.1, axis=0) == pytest.approx(0.1 * np.ones(4), abs=0.06)
+
+
+def test_differences_of_neighbours_do_not_see_a_smooth_misfit():
+    rng = np.random.default_rng(4)
+    t = np.linspace(0.0, 1.0, 2000)
+    data = readings(np.zeros(2000), covariates={"time [s]": t})
+    every = np.ones(2000, dtype=bool)
+    found = estimated_noise(0.1 * rng.normal(size=2000) + 50.0 * np.sin(5.0 * t), data, every)
+    # By the median, whose standard error is 1.17/√n of it.
+    assert found == pytest.approx(0.1, rel=0.1)

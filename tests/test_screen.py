@@ -1,0 +1,110 @@
+"""Effects judged to first order: the drop of the sum of squares of explicit least squares."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from linear import Linear, covariance, readings
+from scipy.stats import chi2
+
+from fabric_fenicsx.inputs.parameters import Parameter
+from fabric_fenicsx.loop.inference.effects import Effect, Variant
+from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.noise import Noise
+from fabric_fenicsx.loop.inference.screen import Screen
+from fabric_fenicsx.loop.inference.starts import ToFirstOrder, signatures
+from fabric_fenicsx.loop.inference.variances import Variances
+
+NOISE, TAU = Noise(0.1, 0.0, 0.3), 0.2
+
+
+def effect(name, *names, lower=-np.inf):
+    amplitudes = tuple(Parameter(n, (), lower, amplitude=True) for n in names)
+    return Effect(name, "linear", "", (Variant("only", amplitudes),))
+
+
+@pytest.fixture(scope="module")
+def tried():
+    """Four specimens' lines with part of a square, a wave of either sign, and a kink of no use."""
+    t = np.tile(np.linspace(-1.0, 1.0, 30), 4)
+    run = np.repeat(np.arange(4), 30)
+    rng = np.random.default_rng(1)
+    columns = {"a": np.ones_like(t), "b": t, "square": t**2, "cube": t**3, "sine": np.sin(4 * t)}
+    columns |= {"cosine": np.cos(4 * t), "up": np.abs(t), "down": -np.abs(t), "same": 2.0 * t}
+    observed = (
+        2.0 + t + 0.2 * t**2 + 0.1 * np.cos(4.0 * t) - 0.3 * np.abs(t) + 0.1 * rng.normal(size=120)
+    )
+    effects = [
+        effect("square", "square"),
+        effect("cube", "cube"),
+        effect("wave", "sine", "cosine"),
+        effect("up", "up", lower=0.0),
+        effect("down", "down", lower=0.0),
+        effect("same", "same"),
+    ]
+    test = Linear(readings(observed, run=run), columns, ("a", "b"), effects=effects)
+    variances = Variances(NOISE, {"a": TAU, "b": 0.0})
+    base = fit(test, (), {"a": 1.0, "b": 1.0}, test.readings.fit, variances)
+    alike, _ = test.predict((), base.values)
+    signs = {e: {v: signatures(test, base, alike, v) for v in e.variants} for e in effects}
+    return test, base, Screen(base, ToFirstOrder(test, base, variances, None), signs)
+
+
+def left(test, base, names):
+    """Sum of squares, deviations' penalty included, of least squares about the fit."""
+    data, rows = test.readings, test.readings.fit
+    W = np.linalg.inv(np.linalg.cholesky(covariance(data, rows, NOISE)))
+    which = data.specimen[:, None] == np.arange(4)
+    common = [base.slopes[:, k] for k in range(2)]
+    A = W @ np.column_stack([*common, *(test.columns[n] for n in names)])
+    Z = TAU * base.values["a"] * W @ (test.columns["a"][:, None] * which)
+    stacked = np.block([[A, Z], [np.zeros((4, A.shape[1])), np.eye(4)]])
+    r = W @ (data.observed - test.predict((), base.values)[0])
+    y = np.r_[r, np.zeros(4)]
+    return np.sum((y - stacked @ np.linalg.lstsq(stacked, y, rcond=None)[0]) ** 2)
+
+
+def test_scores_are_what_least_squares_gains(tried):
+    test, base, screen = tried
+    before = left(test, base, [])
+    scores = screen.scores(test.effects)
+    for e, (score, chance) in zip(test.effects, scores, strict=True):
+        names = [p.name for p in e.variants[0].parameters]
+        gain = before - left(test, base, names)
+        if e.name in ("up", "down", "same"):
+            continue
+        assert score == pytest.approx(gain, rel=1e-5, abs=1e-6)
+        # Of six that were tried.
+        assert chance == pytest.approx(min(1.0, 6.0 * chi2.sf(gain, len(names))), rel=1e-3)
+
+
+def test_an_amplitude_of_the_wrong_sign_gains_nothing(tried):
+    test, base, screen = tried
+    scores = dict(zip([e.name for e in test.effects], screen.scores(test.effects), strict=True))
+    gain = left(test, base, []) - left(test, base, ["up"])
+    assert sorted([scores["up"][0], scores["down"][0]]) == pytest.approx([0.0, gain], rel=1e-5)
+    assert gain > 5.0
+
+
+def test_what_the_baseline_imitates_gains_nothing(tried):
+    test, _, screen = tried
+    scores = dict(zip([e.name for e in test.effects], screen.scores(test.effects), strict=True))
+    assert scores["same"] == (0.0, 1.0)
+
+
+def test_sets_of_effects_are_ranked_by_what_they_gain_together(tried):
+    """All pairs and, of those that a good pair is part of, triples."""
+    test, base, screen = tried
+    useful = [e for e in test.effects if e.name not in ("up", "down", "same")]
+    for count in (2, 3):
+        gains = {}
+        for several in combinations(useful, count):
+            names = [p.name for e in several for p in e.variants[0].parameters]
+            cost = len(names) * np.log(120.0)
+            gains[frozenset(e.name for e in several)] = cost + left(test, base, names)
+        best = [
+            frozenset(e.name for e in test.effects for v, _ in one if v in e.variants)
+            for one in screen.best(100, count)
+        ]
+        mine = [one for one in best if one in gains]
+        assert mine == sorted(gains, key=gains.get)
