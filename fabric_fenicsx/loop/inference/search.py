@@ -146,6 +146,9 @@ class _Search:
         rivals = self._rivals(final, levels)
         for candidate in candidates:
             if candidate.fit is not None:
+                # Those far behind have not got their own noise and scatter yet.
+                model = self._refined(self.judge.weighed(candidate.fit, (candidate.effect,)))
+                candidate.fit, candidate.criterion = model.fit, model.criterion
                 candidate.holdout = self.judge.holdout(candidate.fit)
         return Diagnosis(
             experiment=self.experiment,
@@ -204,8 +207,7 @@ class _Search:
         levels.append(self._best_refined(singles))
         for candidate in candidates:
             mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
-            if mine:
-                candidate.fit, candidate.criterion = mine[0].fit, mine[0].criterion
+            candidate.fit = mine[0].fit if mine else None
         for count in range(2, CRITERIA.most_effects + 1):
             best = min((m for level in levels for m in level), key=lambda m: m.criterion)
             if (

@@ -19,6 +19,7 @@ from ..inference.effects import Effect, Parameter, Variant
 from ..inference.fitting import Fit, parameters_of
 from ..inference.next_tests import NextTest, next_tests_report
 from ..inference.predictive_check import Check, predictive_check
+from ..inference.validation import has_own
 from ..measurement.schema import Measurement, Run
 from .plausibility import correlations, doubts
 from .words import headline, parameter_unit, reasons
@@ -77,6 +78,7 @@ def test_report(
         "laboratories": [
             asdict(lab) | {"folder": str(measurements[lab.folder].folder)} for lab in d.laboratories
         ],
+        "own_of_runs": has_own(nearest.variants),
         "curve": None if d.curve is None else _curve(d),
         "holdout_source": d.holdout_source,
         "model": _numbers(d, d.final, d.holdout_after),

@@ -65,12 +65,13 @@ def _offsets(d: Diagnosis, model: Fit) -> Iterator[str]:
 
 
 def _scatter(model: Fit) -> Iterator[str]:
-    for group, share in model.variances.scatter.items():
-        if share > LARGE_SCATTER:
-            yield (
-                f"Specimens would differ by {share:.0%} in {group.replace(' ', ', ')}: more than "
-                "one fabric does, unless it was handled, cut or clamped in different ways."
-            )
+    large = {g: share for g, share in model.variances.scatter.items() if share > LARGE_SCATTER}
+    if large:
+        listed = "; ".join(f"{', '.join(g.split())}: {share:.0%}" for g, share in large.items())
+        yield (
+            f"Specimens would differ by more than {LARGE_SCATTER:.0%} ({listed}): those of one "
+            "fabric do only if they were handled, cut or clamped in different ways."
+        )
 
 
 def correlations(model: Fit) -> list[tuple[str, str, float]]:

@@ -138,7 +138,10 @@ def _laboratories(report: Mapping[str, Any]) -> Iterator[str]:
         error, expected = (100.0 * lab[key] / lab["size"] for key in ("foretold", "expected"))
         found.append(f"{name} within {error:.0f} % (expected {expected:.0f} %)")
     if found:
-        yield f"Of each folder's readings the others foretell, of their size: {_listed(found)}."
+        zero = ", but for its zero and drift" if report["own_of_runs"] else ""
+        yield (
+            f"Of each folder's readings{zero} the others foretell, of their size: {_listed(found)}."
+        )
 
 
 def reasons(report: Mapping[str, Any]) -> list[str]:
@@ -179,10 +182,10 @@ def _weighed(candidate: Mapping[str, Any], smaller: str, loses: float) -> str:
     """Why a candidate with a smaller error was not chosen."""
     text = f"{candidate['name']} has a smaller error ({smaller}), "
     if loses < 0.0:
-        return text + f"and its criterion is better by {-loses:.3g}: it did not bear scrutiny."
+        return text + f"and its criterion is better by {-loses:.1f}: it did not bear scrutiny."
     if loses < CRITERIA.decisive:
-        return text + f"its criterion is worse by {loses:.2g}: the data do not decide."
+        return text + f"its criterion is worse by {loses:.1f}: the data do not decide."
     return text + (
-        f"its criterion is worse by {loses:.3g}: with the parameters, forms, noise and scatter "
+        f"its criterion is worse by {loses:.0f}: with the parameters, forms, noise and scatter "
         "that it needs the fitted readings are less likely."
     )
