@@ -1,10 +1,11 @@
 """Diagnose folders of published measurements and write what came out as docs/measured.md.
 
-    python scripts/measured_page.py FOLDER [FOLDER ...] [--together FOLDER FOLDER ...] [--law CSV]
+    python scripts/measured_page.py FOLDER ... [--together FOLDER ...] [--law CSV]
 
-Each folder is diagnosed by itself, and those of one fabric once more together. The readings themselves stay where they are. What a comment at the top of a measurement.yaml says
-of its source is quoted. With a measured bending law (columns curvature_1_per_m and moment_N, a
-moment per width) the law fitted to a cantilever is compared with it, which no fit has seen.
+Each folder is diagnosed by itself, and those of one fabric once more together. The readings
+themselves stay where they are. What a comment at the top of a measurement.yaml says of its source
+is quoted. With a measured bending law (columns curvature_1_per_m and moment_N, a moment per width)
+the law fitted to a cantilever is compared with it, which no fit has seen.
 """
 
 from __future__ import annotations
@@ -32,12 +33,12 @@ Readings of published figures and photographs, each diagnosed by
 
     fabric-fenicsx diagnose FOLDER
 
-and written here by `python scripts/measured_page.py FOLDER ... --together FOLDER ...`. Errors are root
-mean squares. *Nearest* is the model with the smallest criterion where none explains the readings: it is not
-claimed. A gain is in −2 log evidence over the baseline; 10 decide
-([how a diagnosis decides](diagnosis.md)). None of the readings is kept in this repository; the sources
-are named. Some thresholds were changed after these curves had been seen: they are no evidence for
-them.
+and written here by `python scripts/measured_page.py FOLDER ... --together FOLDER ...`. Errors are
+root mean squares. *Nearest* is the model with the smallest criterion where none explains the
+readings: it is not claimed. A gain is in −2 log evidence over the baseline; 10 decide
+([how a diagnosis decides](diagnosis.md)). None of the readings is kept in this repository; the
+sources are named. Some thresholds were changed after these curves had been seen: they are no
+evidence for them.
 
 """
 
@@ -78,8 +79,8 @@ def section(folders: Sequence[Path], report: dict[str, Any]) -> str:
     lines += _errors(report)
     noise = report["noise_model"]
     lines += [
-        f"Noise {number(report['error']['noise'])}: {report['noise_source']}. As the model leaves it: "
-        f"{noise['words']}.",
+        f"Noise {number(report['error']['noise'])}: {report['noise_source']}. As the model leaves "
+        f"it: {noise['words']}.",
         "",
     ]
     lines += _laboratories(report)
