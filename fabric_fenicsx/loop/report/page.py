@@ -93,7 +93,9 @@ def chance(value: float | None) -> Markup:
 
 def share(value: float | None) -> Markup:
     """A share in percent for a table."""
-    return number(None) if value is None else Markup(f"{100.0 * value:.0f} %")
+    if value is None:
+        return number(None)
+    return Markup("&lt; 1 %") if value < 0.005 else Markup(f"{100.0 * value:.0f} %")
 
 
 def _figures(
