@@ -74,7 +74,7 @@ def section(folder: Path, report: dict[str, Any]) -> str:
         mark = " (rival)" if candidate["name"] in rivals else ""
         cells = [number(candidate[key]) for key in ("score", "error_fit", "error_holdout")]
         lines.append(f"| {candidate['name']}{mark} | {' | '.join(cells)} |")
-    for advice in report["further_tests"]:
+    for advice in report["next_tests"]:
         lines += ["", f"- {' and '.join(advice['effects'])}: {advice['do']}"]
     return "\n".join([*lines, "", ""])
 
