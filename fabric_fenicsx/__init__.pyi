@@ -45,7 +45,7 @@ from .loop.kinds.drape.model import Drape as Drape
 from .loop.kinds.drape.variant import DrapeVariant as DrapeVariant
 from .loop.kinds.picture_frame.variant import FrameVariant as FrameVariant
 from .loop.report.figures import data_figure as data_figure
-from .loop.report.figures import residual_figure as residual_figure
+from .loop.report.residuals import residual_figure as residual_figure
 from .loop.synthesise import Hidden as Hidden
 from .loop.synthesise import synthesise as synthesise
 from .loop.synthesise import write_measurement as write_measurement

@@ -21,7 +21,8 @@ from test_drape_loop import angle, made_up, marks, written
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.loop.kinds.drape import model as drape
 from fabric_fenicsx.loop.kinds.drape.model import Drape
-from fabric_fenicsx.loop.report.content import SCHEMA, parameter_unit
+from fabric_fenicsx.loop.report.content import SCHEMA
+from fabric_fenicsx.loop.report.words import parameter_unit
 
 RECIPES = {recipe.name: recipe for recipe in sixty(1)}
 #: One set of each verdict, with the effects in it.
@@ -91,6 +92,42 @@ def test_the_report_keeps_the_contract(diagnosed, name):
     assert not (out / "report.json.partial").exists()
 
 
+@pytest.mark.parametrize("name", SETS)
+def test_runs_make_up_the_whole(diagnosed, name):
+    """Squares of the runs' errors add up to the fitted ones'; the page has a row for each run."""
+    _, out = diagnosed[name]
+    report = report_of(out)
+    left_out = report["left_out"]
+    total = {"before": 0.0, "after": 0.0}
+    count = 0
+    (measurement,) = report["measurements"]
+    for run in (run for run in measurement["runs"] if run["role"] == "fit"):
+        own = run["readings"] - sum(o["file"] == run["file"] for o in left_out["outliers"])
+        own -= sum(o["readings"] for o in left_out["not_comparable"] if o["file"] == run["file"])
+        count += own
+        for when in total:
+            total[when] += own * run["error"][when] ** 2
+        low, high = run["expected_error"]
+        assert 0.0 < low < high and 0.0 <= run["more_extreme"] <= 1.0
+        assert set(run["parameters"]) >= set(report["baseline"]["parameters"])
+    for when, square in total.items():
+        assert math.sqrt(square / count) == pytest.approx(report["error"][when]["fit"], rel=1e-9)
+    checks = report["predictive_check"]
+    assert checks[0]["statistic"] == "root mean square"
+    nearest = report["best"] or report["model"]
+    assert checks[0]["observed"] == pytest.approx(nearest["error_fit"], rel=1e-9)
+
+
+def test_the_criterion_is_that_of_the_chosen(diagnosed):
+    """A found effect gains what decides; no other effect by itself has a better criterion."""
+    report = report_of(diagnosed["crossover_friction-dahl"][1])
+    own, before = report["criterion"]["after"], report["criterion"]["before"]
+    assert before - own > 10.0
+    best = min(report["candidates"], key=lambda c: c["criterion"])
+    assert best["name"] == "crossover_friction"
+    assert best["criterion"] == pytest.approx(own, abs=0.5)
+
+
 def test_the_unexplained_says_what_came_nearest(diagnosed):
     report = report_of(diagnosed["unlisted-vibration"][1])
     assert report["best"]["effects"] and report["best"]["effects"][0]["name"] in report["headline"]
@@ -118,7 +155,7 @@ def test_the_page_stands_by_itself(diagnosed, name):
     text = (out / "report.html").read_text()
     page = Images()
     page.feed(text)
-    kinds = ("data", "residuals", "candidates")
+    kinds = ("data", "residuals", "dependence", "noise", "candidates")
     assert len(page.images) == len(page.loaded) == len(kinds)
     assert "url(" not in text and "@import" not in text
     for source in page.images:

@@ -19,6 +19,7 @@ import yaml
 
 from fabric_fenicsx import rigs
 from fabric_fenicsx.__main__ import main
+from fabric_fenicsx.loop.inference.criteria import CRITERIA
 from fabric_fenicsx.loop.kinds.cantilever.effects import CANTILEVER_EFFECTS
 from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
 from fabric_fenicsx.loop.kinds.picture_frame.effects import PICTURE_FRAME_EFFECTS
@@ -46,6 +47,18 @@ def test_every_form_of_every_effect_is_in_the_tutorial():
     effects = (*PICTURE_FRAME_EFFECTS, *CANTILEVER_EFFECTS, *DRAPE_EFFECTS)
     for effect in effects:
         assert [v.label for v in effect.variants if v.label not in rows[effect.name]] == []
+
+
+def test_the_thresholds_of_a_diagnosis_are_those_of_the_code():
+    text = (DOCS / "diagnosis.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]+) \|", text, re.M)
+    said = {
+        name.strip("`"): float(value)
+        for names, values in rows
+        for name, value in zip(names.split(", "), values.split(", "), strict=True)
+    }
+    assert len(said) > 10
+    assert said == {name: float(getattr(CRITERIA, name)) for name in said}
 
 
 def with_commands(slow):

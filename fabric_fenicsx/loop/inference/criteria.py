@@ -43,7 +43,7 @@ class Criteria:
             not, if the residual has structure; made-up.
         settled: ... up to which no further effect is looked for; made-up.
         scatter: ... and if it has none: nobody knows their noise better; made-up.
-        usual_scatter: of specimens, as a share of a parameter (half-normal prior); convention.
+        usual_scatter: of specimens, as a share of a parameter (half-normal prior); made-up.
         laboratories: ... where they are from several laboratories; published.
         usual_share: of a reading that its noise grows by (half-normal prior); convention.
         stated_within: relative sigma of a noise that was stated; convention.
@@ -82,7 +82,7 @@ class Criteria:
     near: float = 1.15
     settled: float = 1.03
     scatter: float = 1.25
-    usual_scatter: float = 0.12
+    usual_scatter: float = 0.1
     laboratories: float = 0.6
     usual_share: float = 0.05
     stated_within: float = 0.15

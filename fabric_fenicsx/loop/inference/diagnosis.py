@@ -32,6 +32,7 @@ class Candidate:
         p_value: of that score, over all candidates that were tried.
         fit: the model with its best form; None where it has no solution.
         holdout: held-out error of that model.
+        criterion: −2 log of its evidence, to a constant of the readings; see judge.
     """
 
     effect: Effect
@@ -39,6 +40,7 @@ class Candidate:
     p_value: float
     fit: Fit | None = None
     holdout: float = float("nan")
+    criterion: float = float("nan")
 
 
 @dataclass(slots=True)
@@ -60,6 +62,7 @@ class Diagnosis:
         holdout_before, holdout_after, holdout_best: held-out errors of the three models.
         holdout_expected: what the final model itself expects of its own; NaN without holdout runs.
         holdout_source: how they were come by.
+        criterion_before, criterion_after: of the baseline and the final model; see judge.
         white_before, white_after: tests of the residuals.
         outliers: readings that were left out, (n,).
         curve: what readings know that are all on one curve; None where they know more.
@@ -88,6 +91,8 @@ class Diagnosis:
     white_before: Whiteness
     white_after: Whiteness
     outliers: Flags
+    criterion_before: float = float("nan")
+    criterion_after: float = float("nan")
     curve: Curve | None = None
     of_the_curve: tuple[str, ...] = ()
     laboratories: tuple[Laboratory, ...] = ()

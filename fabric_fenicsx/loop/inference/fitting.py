@@ -145,6 +145,14 @@ class Fit:
         """Standard errors, for what is left where that is more than the noise."""
         return {name: std * self._misfit for name, std in self.std.items()}
 
+    def errors_given(self, names: Sequence[str], known: Sequence[str]) -> dict[str, float]:
+        """Standard errors of some parameters if others were known to be as found."""
+        place = {name: k for k, name in enumerate(self.values)}
+        own, given = (self.root[[place[n] for n in some]] for some in (names, known))
+        # What the known ones leave of the independent combinations.
+        left = own - own @ np.linalg.pinv(given) @ given if len(known) else own
+        return dict(zip(names, np.linalg.norm(left, axis=1) * self._misfit, strict=True))
+
     @property
     def _misfit(self) -> float:
         return max(1.0, float(np.sqrt(self.sum_of_squares / self.freedom)))

@@ -228,12 +228,16 @@ class Judge:
         return bool(mine * own[0] < slack * other * own[1])
 
     def significant(self, model: Model) -> bool:
-        """Whether every effect's amplitude is more than its standard error."""
-        errors = model.fit.errors
+        """Whether every effect has an amplitude that is more than its standard error.
+
+        For its shape as it was found: without the effect there would be none.
+        """
         return all(
             any(
-                abs(model.fit.values[p.name]) > CRITERIA.significant * errors[p.name]
-                for p in variant.amplitudes
+                abs(model.fit.values[name]) > CRITERIA.significant * error
+                for name, error in model.fit.errors_given(
+                    [p.name for p in variant.amplitudes], [p.name for p in variant.shapes]
+                ).items()
             )
             for variant in model.fit.variants
         )

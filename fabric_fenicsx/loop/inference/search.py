@@ -146,6 +146,9 @@ class _Search:
         rivals = self._rivals(final, levels)
         for candidate in candidates:
             if candidate.fit is not None:
+                # Those far behind have not got their own noise and scatter yet.
+                model = self._refined(self.judge.weighed(candidate.fit, (candidate.effect,)))
+                candidate.fit, candidate.criterion = model.fit, model.criterion
                 candidate.holdout = self.judge.holdout(candidate.fit)
         return Diagnosis(
             experiment=self.experiment,
@@ -169,6 +172,8 @@ class _Search:
             white_before=self.judge.misfit(baseline).whiteness,
             white_after=self.judge.misfit(final).whiteness,
             outliers=self.judge.outliers,
+            criterion_before=baseline.criterion,
+            criterion_after=final.criterion,
             curve=curve,
             of_the_curve=of_the_curve,
             laboratories=tuple(self.judge.laboratories(judged.fit, misfit.noise)),
@@ -199,10 +204,10 @@ class _Search:
             own = [((v, s),) for v, shapes in signs[candidate.effect].items() for s in shapes]
             found += [(f, (candidate.effect,)) for f in self._fitted(own, starts=2)]
         singles = self._weighed(found)
-        for candidate in candidates:
-            mine = [m for m in singles if m.effects == (candidate.effect,)]
-            candidate.fit = mine[0].fit if mine else None
         levels.append(self._best_refined(singles))
+        for candidate in candidates:
+            mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
+            candidate.fit = mine[0].fit if mine else None
         for count in range(2, CRITERIA.most_effects + 1):
             best = min((m for level in levels for m in level), key=lambda m: m.criterion)
             if (

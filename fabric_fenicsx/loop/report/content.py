@@ -6,45 +6,27 @@ by, what was left out, what cannot be told apart, what to measure next) is for t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from ...inputs.keys import UNITS, one_of
 from ...output.page import finite
 from ..inference.criteria import CRITERIA
 from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Effect, Parameter, Variant
 from ..inference.fitting import Fit, parameters_of
 from ..inference.next_tests import NextTest, next_tests_report
+from ..inference.predictive_check import Check, predictive_check
+from ..inference.validation import has_own
 from ..measurement.schema import Measurement, Run
+from .plausibility import correlations, doubts
+from .words import headline, parameter_unit, reasons
 
-__all__ = ["SCHEMA", "combined_report", "headline", "parameter_unit", "test_report"]
+__all__ = ["SCHEMA", "combined_report", "nearest_model", "test_report"]
 
 SCHEMA = "fabric-report/1"
-
-PARAMETER_UNITS = {
-    "N_s_n": "N sⁿ",
-    "1_rad2": "1/rad²",
-    "rad_per_N": "rad/N",
-    "N_mm3": "N mm³",
-    "1_mm": "1/mm",
-    "rad_s": "rad/s",
-    "rad": "rad",
-    "N_s": "N s",
-}
-OTHER_UNITS = {"drift_N_s": "N/s"}
-"""A drift's unit is written like a dashpot's."""
-
-
-def parameter_unit(name: str) -> str:
-    """Unit that stands at the end of a parameter's name; empty if there is none."""
-    if name in OTHER_UNITS:
-        return OTHER_UNITS[name]
-    endings = PARAMETER_UNITS | UNITS
-    return next((text for end, text in endings.items() if name.endswith("_" + end)), "")
 
 
 def test_report(
@@ -61,7 +43,9 @@ def test_report(
         The content of report.json; a number that is not finite is None.
     """
     d, noise = diagnosis, diagnosis.noise
-    rows = d.baseline.used
+    rows, nearest = d.baseline.used, nearest_model(d)
+    compared = d.experiment.readings.usable & ~d.outliers
+    checks = predictive_check(nearest, compared) if compared.any() else []
     content = {
         "schema": SCHEMA,
         "test": d.experiment.test,
@@ -75,9 +59,11 @@ def test_report(
                 "error_fit": c.fit.rms(rows) if c.fit else None,
                 "converged": c.fit.converged if c.fit else None,
                 "error_holdout": c.holdout,
+                "criterion": c.criterion,
             }
             for c in d.candidates
         ],
+        "criterion": {"before": d.criterion_before, "after": d.criterion_after},
         "baseline": {"parameters": d.baseline.values, "std": _std(d, d.baseline)},
         "error": {
             "quantity": d.experiment.quantity,
@@ -92,6 +78,7 @@ def test_report(
         "laboratories": [
             asdict(lab) | {"folder": str(measurements[lab.folder].folder)} for lab in d.laboratories
         ],
+        "own_of_runs": has_own(nearest.variants),
         "curve": None if d.curve is None else _curve(d),
         "holdout_source": d.holdout_source,
         "model": _numbers(d, d.final, d.holdout_after),
@@ -100,7 +87,10 @@ def test_report(
         "identifiability": {
             "correlated": [list(pair) for pair in d.final.correlated],
             "at_bound": list(d.final.at_bound),
+            "correlations": [list(pair) for pair in correlations(nearest)],
         },
+        "predictive_check": [asdict(check) for check in checks if check.run is None],
+        "doubts": doubts(d, nearest),
         "left_out": _left_out(d, measurements),
         "whiteness": {"before": asdict(d.white_before), "after": asdict(d.white_after)},
         "parameters": {
@@ -116,7 +106,7 @@ def test_report(
                         "label": run.label,
                         "role": "holdout" if run.holdout else "fit",
                         "readings": run.count,
-                        **_of_run(d, number),
+                        **_of_run(d, number, checks),
                     }
                     for number, run in runs
                 ],
@@ -126,25 +116,40 @@ def test_report(
         "notes": list(d.notes),
     }
     numbers: dict[str, Any] = finite(content)
-    return numbers | {"headline": headline(numbers)}
+    return numbers | {"headline": headline(numbers), "reasons": reasons(numbers)}
+
+
+def nearest_model(d: Diagnosis) -> Fit:
+    """The reported model, or the one that came nearest where none explains the data."""
+    return d.final if d.best is None else d.best
 
 
 def noise_model(d: Diagnosis) -> dict[str, Any]:
     """What a reading scatters by, in numbers and in words."""
-    noise, unit = d.noise_model, parameter_unit(d.experiment.quantity)
+    noise, readings = d.noise_model, d.experiment.readings
+    unit, stated = parameter_unit(d.experiment.quantity), d.experiment.noise
     words = []
     if noise.correlation > CRITERIA.said_correlation:
         words.append(f"correlated from one reading to the next by {noise.correlation:.2f} (AR(1))")
-    at_largest = noise.share * float(np.abs(d.experiment.readings.observed).max())
+    at_largest = noise.share * float(np.abs(readings.observed).max())
     if at_largest > noise.floor:
         words.append(f"growing by {100.0 * noise.share:.2g} % of the reading")
     if d.quantum > CRITERIA.said_quantum * d.noise:
         words.append(f"written in steps of {d.quantum:.3g} {unit}")
+    # The model's own error, where it has one, is in what is printed and not in what is stated.
+    other = (
+        stated is not None
+        and readings.model_error is None
+        and not 1.0 / CRITERIA.scatter < d.noise / stated < CRITERIA.scatter
+    )
     return {
         "floor": noise.floor,
         "share": noise.share,
         "correlation": noise.correlation,
         "quantum": d.quantum,
+        "stated": stated,
+        "other_than_stated": bool(other),
+        "other_than_white": bool(words),
         "words": ", ".join(words) or "independent readings of one sigma",
     }
 
@@ -171,24 +176,32 @@ def _numbered(
         number += len(m.runs)
 
 
-def _of_run(d: Diagnosis, number: int) -> dict[str, Any]:
-    """Specimen, parameters and errors of a run."""
-    readings = d.experiment.readings
+def _of_run(d: Diagnosis, number: int, checks: Sequence[Check]) -> dict[str, Any]:
+    """Specimen, parameters and errors of a run, and how its error lies among replicates."""
+    readings, nearest = d.experiment.readings, nearest_model(d)
     own = readings.run == number
     rows = own & readings.usable & ~d.outliers
     specimen = int(readings.specimen[own][0])
     fitted = bool(rows.any() and not readings.holdout[own].any())
-    deviations = d.final.deviations
+    deviations = {
+        name: deviation for group, deviation in nearest.deviations.items() for name in group.split()
+    }
+    check = next((c for c in checks if c.run == number), None)
     return {
         "specimen": readings.specimens[specimen],
         "parameters": {
-            p.name: d.final.values[p.name]
-            * (1.0 + (deviations[p.name][specimen] if p.name in deviations else 0.0))
-            for p in d.experiment.baseline
+            name: value * (1.0 + (deviations[name][specimen] if name in deviations else 0.0))
+            for name, value in nearest.values.items()
         }
         if fitted
         else None,
-        "error": {"before": d.baseline.rms(rows), "after": d.final.rms(rows)},
+        "error": {
+            "before": d.baseline.rms(rows),
+            "after": d.final.rms(rows),
+            "nearest": nearest.rms(rows),
+        },
+        "expected_error": None if check is None else [check.low, check.high],
+        "more_extreme": None if check is None else check.share,
     }
 
 
@@ -209,55 +222,6 @@ def combined_report(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
     if len(reports) == 1:
         return reports[0]
     return reports[-1] | {"tests": {report["test"]: report for report in reports}}
-
-
-def headline(report: Mapping[str, Any]) -> str:
-    """The verdict in one or two plain sentences."""
-    error = report["error"]
-    unit = parameter_unit(error["quantity"])
-
-    def value(number: float | None) -> str:
-        return "unknown" if number is None else f"{number:.2g} {unit}"
-
-    before, after = (value(error[when]["holdout"]) for when in ("before", "after"))
-    scatter = f"a reading scatters by {value(error['noise'])}"
-    if report["verdict"] == "no_effect":
-        return (
-            "The baseline model explains the data, no effect has to be added: "
-            f"held-out error {before}; {scatter}."
-        )
-    if report["verdict"] == "effect_found":
-        names = " and ".join(effect["name"] for effect in report["effects"])
-        verb = "explain" if len(report["effects"]) > 1 else "explains"
-        text = (
-            f"{names} {verb} the residual: held-out error {before} before, {after} after; "
-            f"{scatter}."
-        )
-        for effect in report["effects"]:
-            if effect["rivals"]:
-                text += f" This data cannot tell {effect['name']} from {one_of(effect['rivals'])}."
-        return text
-    if report["curve"] is not None:
-        text = (
-            "The readings go one way at one rate: they know the curve of the moment against the "
-            f"angle, which the baseline is not (error {value(error['before']['fit'])}; {scatter}), "
-            "and not what makes it."
-        )
-        names = report["curve"]["effects"]
-        return text + (f" It may be {one_of(names)}." if names else "")
-    nor = "and no known effect explains it, nor does a pair of them"
-    text = f"The residual is not noise, {nor}: held-out error {before}; {scatter}."
-    fitted = error["before"]["fit"]
-    if fitted is not None and fitted <= CRITERIA.scatter * error["noise"]:
-        text = (
-            "The fitted readings are what the baseline says within their noise, the held-out ones "
-            f"are not, {nor}: error {value(fitted)} and {before}; {scatter}."
-        )
-    best = report["best"]
-    if best is not None and best["effects"]:
-        names = " and ".join(effect["name"] for effect in best["effects"])
-        text += f" Nearest came {names}, with {value(best['error_fit'])} left in the fitted runs."
-    return text
 
 
 def _effect(d: Diagnosis, effect: Effect) -> dict[str, Any]:

@@ -14,69 +14,53 @@ from matplotlib.figure import Figure
 
 from ..inference.diagnosis import Diagnosis
 from ..inference.fitting import Fit
-from ..kinds import KINDS, kind_of
+from ..kinds import kind_of
+from .content import nearest_model
+from .drawing import (
+    AFTER,
+    BEFORE,
+    FAINT,
+    FITTED,
+    HELD_OUT,
+    INK,
+    MANY,
+    blank,
+    legend,
+    quantity_label,
+    run_panels,
+    shown_model,
+)
 
-__all__ = [
-    "candidates_figure",
-    "data_figure",
-    "law_figure",
-    "quantity_label",
-    "residual_figure",
-    "shown_model",
-]
+__all__ = ["candidates_figure", "curve_figure", "data_figure", "law_figure", "reading_std"]
 
-Flags = npt.NDArray[np.bool_]
-
-FITTED, HELD_OUT, BEFORE, AFTER, FAINT = "#22577a", "#d9822b", "#98a2ad", "#22577a", "#e3e7eb"
-INK = "#27313b"
-WIDTH = 10.0  # of a figure [inch]
-MANY = 4000  # readings above which their markers are drawn as pixels
+Array = npt.NDArray[np.float64]
 
 LAW_AXES = {"curvature_1_mm": "curvature [1/mm]", "moment_N": "moment per width [N]"}
-
-
-def quantity_label(quantity: str) -> str:
-    """What is compared, with its unit, as on an axis."""
-    return next(kind.label for kind in KINDS if kind.quantity == quantity)
-
-
-def shown_model(diagnosis: Diagnosis) -> tuple[Fit, str] | None:
-    """The model to be shown beside the baseline and what to call it; None: there is none."""
-    if diagnosis.verdict == "effect_found":
-        return diagnosis.final, "with " + " and ".join(e.name for e in diagnosis.effects)
-    best = diagnosis.best
-    if diagnosis.verdict == "unexplained" and best is not None and best.variants:
-        names = [
-            effect.name
-            for variant in best.variants
-            for effect in diagnosis.experiment.effects
-            if variant in effect.variants
-        ]
-        return best, "with " + " and ".join(names) + " (nearest)"
-    return None
+CURVE_AXES = {"shear_angle_rad": "shear angle [rad]", "moment_N": "shear moment per area [N]"}
 
 
 def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
     """Readings with the fitted baseline and the reported model, a panel for each run.
+
+    The band is what the model expects of a reading, twice its standard error and the noise
+    together.
 
     Args:
         diagnosis: what was found.
         names: of the runs.
     """
     readings = diagnosis.experiment.readings
-    label, along = next(iter(readings.covariates.items()))
-    columns = 2 if len(names) in (2, 4) else min(len(names), 3)
-    rows = -(-len(names) // columns)
-    figure = _figure(0.5 + 2.7 * rows)
-    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    along = next(iter(readings.covariates.values()))
+    figure, panels = run_panels(
+        diagnosis, names, 2.7, quantity_label(diagnosis.experiment.quantity)
+    )
     model = shown_model(diagnosis)
+    expecting = nearest_model(diagnosis)
+    band = 2.0 * reading_std(expecting)
     # Readings all over a sheet are on no line.
     scattered = kind_of(diagnosis.experiment.test).scattered
     compared = readings.usable & ~diagnosis.outliers
-    for number, axes in enumerate(panels.flat):
-        if number >= len(names):
-            axes.set_visible(False)
-            continue
+    for number, axes in enumerate(panels):
         own = np.flatnonzero(readings.run == number)
         for kind, flags in (("reading", compared), ("left out", ~compared)):
             at = own[flags[own]]
@@ -98,6 +82,15 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
             curve: dict[str, Any] = {"linestyle": (0, (4, 2))}
             if scattered:
                 curve = {"linestyle": "none", "marker": "o", "markersize": 4, "fillstyle": "none"}
+            else:
+                axes.fill_between(
+                    along[part],
+                    expecting.expected[part] - band[part],
+                    expecting.expected[part] + band[part],
+                    color=FAINT,
+                    linewidth=0,
+                    label="± 2 σ of a reading, foretold" if first else None,
+                )
             axes.plot(
                 along[part],
                 diagnosis.baseline.expected[part],
@@ -114,69 +107,17 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
                     label=text if first else None,
                     **(curve if scattered else {}),
                 )
-        held = bool(readings.holdout[own].any())
-        axes.set_title(
-            f"{names[number]}, held out" if held else names[number],
-            color=HELD_OUT if held else INK,
-            fontsize=9,
-            loc="left",
-        )
-    last = -(-len(names) // columns) - 1
-    for row in range(rows):
-        panels[row, 0].set_ylabel(quantity_label(diagnosis.experiment.quantity))
-    for column in range(columns):
-        # The lowest panel that is shown in a column.
-        row = last if last * columns + column < len(names) else last - 1
-        panels[row, column].set_xlabel(label)
-        panels[row, column].tick_params(labelbottom=True)
-    _legend(figure, panels)
+    legend(figure, panels)
     return figure
 
 
-def residual_figure(diagnosis: Diagnosis) -> Figure:
-    """Residuals before and after against everything that they may depend on."""
-    readings = diagnosis.experiment.readings
-    shown = readings.usable & ~diagnosis.outliers
-    model = shown_model(diagnosis)
-    models = [(diagnosis.baseline, "baseline")] + ([model] if model is not None else [])
-    figure = _figure(0.5 + 2.3 * len(models))
-    panels = figure.subplots(
-        len(models), len(readings.covariates), squeeze=False, sharex="col", sharey="row"
-    )
-    for row, (fit, name) in enumerate(models):
-        for column, (label, along) in enumerate(readings.covariates.items()):
-            axes = panels[row, column]
-            band = 2.0 * diagnosis.noise
-            if np.isfinite(band):
-                axes.axhspan(-band, band, color=FAINT, linewidth=0, label="± 2 noise")
-            axes.axhline(0.0, color=BEFORE, linewidth=0.8)
-            for flags, colour, kind in (
-                (shown & ~readings.holdout, FITTED, "fitted"),
-                (shown & readings.holdout, HELD_OUT, "held out"),
-            ):
-                if not flags.any():
-                    continue
-                axes.scatter(
-                    along[flags],
-                    (fit.residual * readings.weight)[flags],
-                    s=5,
-                    color=colour,
-                    linewidth=0,
-                    label=kind,
-                    rasterized=len(along) > MANY,
-                )
-            axes.ticklabel_format(axis="x", useOffset=False)
-            middle = float(np.mean(along))
-            # What hardly changes has no range of its own.
-            if np.ptp(along) < 1e-3 * abs(middle):
-                axes.set_xlim(sorted((0.9 * middle, 1.1 * middle)))
-            if row == len(models) - 1:
-                axes.set_xlabel(label)
-        panels[row, 0].set_title(name, loc="left", fontsize=9)
-        unit = quantity_label(diagnosis.experiment.quantity).partition("[")[2]
-        panels[row, 0].set_ylabel(f"residual [{unit}")
-    _legend(figure, panels)
-    return figure
+def reading_std(model: Fit) -> Array:
+    """Standard deviation of a reading as a model foretells it, noise included, (n,)."""
+    known = np.linalg.norm(model.slopes @ model.root, axis=1)
+    square = known**2 + model.variances.noise.sigma(model.readings) ** 2
+    if model.readings.model_error is not None:
+        square += np.sum(model.readings.model_error**2, axis=1)
+    return np.asarray(np.sqrt(square))
 
 
 def candidates_figure(diagnosis: Diagnosis) -> Figure | None:
@@ -186,7 +127,7 @@ def candidates_figure(diagnosis: Diagnosis) -> Figure | None:
         return None
     rows = diagnosis.baseline.used
     tried.sort(key=lambda c: c.fit.rms(rows) if c.fit else np.inf, reverse=True)
-    figure = _figure(0.8 + 0.32 * (len(tried) + 1))
+    figure = blank(0.8 + 0.32 * (len(tried) + 1))
     axes = figure.subplots()
     labels = ["baseline"] + [c.effect.name for c in tried]
     fitted = [diagnosis.baseline.rms(rows)] + [c.fit.rms(rows) for c in tried if c.fit]
@@ -222,7 +163,7 @@ def law_figure(table: pd.DataFrame, label: str | None) -> Figure:
         label: of the model; None: it is the baseline.
     """
     x, y = table.columns[:2]
-    figure = _figure(3.2)
+    figure = blank(3.2)
     axes = figure.subplots()
     axes.plot(
         table[x], table[f"baseline_{y}"], color=BEFORE, linestyle=(0, (4, 2)), label="baseline"
@@ -233,29 +174,37 @@ def law_figure(table: pd.DataFrame, label: str | None) -> Figure:
         axes.plot(table[x], table[y], color=AFTER, label=label)
     axes.set_xlabel(LAW_AXES[x])
     axes.set_ylabel(LAW_AXES[y])
-    _legend(figure, np.array([[axes]]))
+    legend(figure, [axes])
     return figure
 
 
-def _figure(height: float) -> Figure:
-    return Figure(figsize=(WIDTH, height), layout="constrained")
-
-
-def _legend(figure: Figure, panels: Any) -> None:
-    """One legend of all panels, above them."""
-    handles: dict[str, Any] = {}
-    for axes in panels.flat:
-        axes.spines[["top", "right"]].set_visible(False)
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    figure.legend(
-        handles.values(),
-        handles.keys(),
-        loc="outside upper right",
-        ncols=len(handles),
-        frameon=False,
-        fontsize=8,
-    )
+def curve_figure(diagnosis: Diagnosis) -> Figure:
+    """What readings on one curve know of it, and how far that is from the fitted baseline."""
+    curve, known = diagnosis.curve, diagnosis.experiment.one_curve
+    assert curve is not None and known is not None
+    model, rows = diagnosis.baseline, np.flatnonzero(diagnosis.baseline.used)
+    order = rows[np.argsort(known.at[rows], kind="stable")]
+    at, per_reading = known.at[order], known.per_reading[order]
+    baseline = model.expected[order] / per_reading
+    figure = blank(3.4)
+    whole, beyond = figure.subplots(1, 2)
+    for axes, less in ((whole, 0.0), (beyond, np.interp(curve.at, at, baseline))):
+        value, band = curve.value - less, 2.0 * curve.std
+        axes.fill_between(
+            curve.at, value - band, value + band, color=AFTER, alpha=0.2, linewidth=0, label="± 2 σ"
+        )
+        axes.plot(curve.at, value, color=AFTER, label="the curve, with no formula presumed")
+        axes.set_xlabel(CURVE_AXES[curve.x])
+    dots: dict[str, Any] = {"color": INK, "markersize": 3, "label": "readings"}
+    whole.plot(at, model.readings.observed[order] / per_reading, ".", **dots)
+    beyond.plot(at, model.residual[order] / per_reading, ".", **dots)
+    dashed: dict[str, Any] = {"color": BEFORE, "linestyle": (0, (4, 2)), "label": "baseline"}
+    whole.plot(at, baseline, **dashed)
+    beyond.axhline(0.0, **dashed)
+    whole.set_ylabel(CURVE_AXES[curve.y])
+    beyond.set_ylabel("less the baseline [N]")
+    legend(figure, [whole, beyond])
+    return figure
 
 
 def _curves(along: Any, observed: Any) -> list[tuple[int, int]]:

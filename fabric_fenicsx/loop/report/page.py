@@ -18,9 +18,11 @@ from ...errors import InputError
 from ...output.files import write_text
 from ...output.page import inline, number, rendered, save_figure
 from ..inference.diagnosis import Diagnosis
-from .content import parameter_unit
-from .figures import candidates_figure, data_figure, law_figure, residual_figure, shown_model
+from .drawing import shown_model
+from .figures import candidates_figure, curve_figure, data_figure, law_figure
 from .law_table import curve_table, law_table
+from .residuals import dependence_figure, noise_figure, residual_figure
+from .words import parameter_unit
 
 __all__ = ["write_report"]
 
@@ -68,12 +70,17 @@ def _write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]
                     name: {"source": inline(figure, name), "caption": caption}
                     for name, (figure, caption) in figures.items()
                 },
+                "added": None if model is None else model[1],
                 "rows": _candidate_rows(report),
                 "parameters": _parameter_rows(report),
+                "runs": _run_rows(report),
+                "next": _next_rows(report),
             }
         )
     template = files(__package__).joinpath("report.html.jinja").read_text(encoding="utf-8")
-    text = rendered(template, {"chance": chance}, sections=sections, version=__version__)
+    text = rendered(
+        template, {"chance": chance, "share": share}, sections=sections, version=__version__
+    )
     write_text(folder / "report.html", text)
 
 
@@ -84,30 +91,54 @@ def chance(value: float | None) -> Markup:
     return number(value, 2)
 
 
+def share(value: float | None) -> Markup:
+    """A share in percent for a table."""
+    if value is None:
+        return number(None)
+    return Markup("&lt; 1 %") if value < 0.005 else Markup(f"{100.0 * value:.0f} %")
+
+
 def _figures(
     diagnosis: Diagnosis, report: Mapping[str, Any], law: pd.DataFrame | None
 ) -> dict[str, tuple[Figure, str]]:
     """Figures by name, each with its caption."""
-    model = shown_model(diagnosis)
+    model, names = shown_model(diagnosis), _run_names(report)
     with_model = f" and the model {model[1]}" if model is not None else ""
-    made = {
+    made: dict[str, tuple[Figure | None, str]] = {
         "data": (
-            data_figure(diagnosis, _run_names(report)),
-            f"Readings, the fitted baseline{with_model}.",
+            data_figure(diagnosis, names),
+            f"Readings, the fitted baseline{with_model}. The band: where the model expects a "
+            "reading, as its parameters are known and readings scatter, two sigma.",
         ),
         "residuals": (
-            residual_figure(diagnosis),
-            "What is left: reading minus model. A model that explains the data leaves points "
-            "without a pattern inside the band.",
+            residual_figure(diagnosis, names),
+            "What is left, run by run: reading minus model. A model that explains the data leaves "
+            "points without a pattern inside the band.",
+        ),
+        "dependence": (
+            dependence_figure(diagnosis),
+            "The same of all runs against what else it may depend on.",
+        ),
+        "noise": (
+            noise_figure(diagnosis),
+            "What is left, as noise: its correlation over readings apart, made white by the "
+            "fitted noise, and its size over that of the reading.",
+        ),
+        "candidates": (
+            candidates_figure(diagnosis),
+            "Errors with each effect added to the baseline alone.",
         ),
     }
     if law is not None:
         drawn = law_figure(law, model[1] if model is not None else None)
         made["law"] = (drawn, f"The fitted law{with_model}; the band is twice its standard error.")
-    candidates = candidates_figure(diagnosis)
-    if candidates is not None:
-        made["candidates"] = (candidates, "Errors with each effect added to the baseline alone.")
-    return made
+    if diagnosis.curve is not None:
+        made["curve"] = (
+            curve_figure(diagnosis),
+            "What the readings know: one curve, with no formula presumed, and twice its standard "
+            "error.",
+        )
+    return {name: (figure, words) for name, (figure, words) in made.items() if figure is not None}
 
 
 def _run_names(report: Mapping[str, Any]) -> list[str]:
@@ -120,16 +151,45 @@ def _run_names(report: Mapping[str, Any]) -> list[str]:
 
 
 def _candidate_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Candidates, those with the smallest fitted error first, and what became of each."""
+    """Candidates, the best criterion first, and what became of each."""
     chosen = {effect["name"]: effect["rivals"] for effect in report["effects"]}
+    before = report["criterion"]["before"]
     rows = []
     for candidate in report["candidates"]:
         of = [name for name, rivals in chosen.items() if candidate["name"] in rivals]
         role = "chosen" if candidate["name"] in chosen else ""
         if of:
             role = "rival of " + " and ".join(of) if len(chosen) > 1 else "rival"
-        rows.append({**candidate, "role": role})
-    return sorted(rows, key=lambda row: math.inf if row["error_fit"] is None else row["error_fit"])
+        own = candidate["criterion"]
+        gain = None if own is None or before is None else before - own
+        rows.append({**candidate, "role": role, "gain": gain})
+    return sorted(rows, key=lambda row: math.inf if row["gain"] is None else -row["gain"])
+
+
+def _run_rows(report: Mapping[str, Any]) -> tuple[list[str], list[dict[str, Any]]]:
+    """Runs, and the parameters that differ between them."""
+    names = _run_names(report)
+    runs = [run for m in report["measurements"] for run in m["runs"]]
+    fitted = [run["parameters"] for run in runs if run["parameters"] is not None]
+    own = [
+        name
+        for name in (fitted[0] if fitted else {})
+        if len({p.get(name) for p in fitted}) > 1
+        and name not in report["identifiability"]["at_bound"]
+    ]
+    return own, [{**run, "name": name} for name, run in zip(names, runs, strict=True)]
+
+
+def _next_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Further runs by the pair of effects they tell apart, the strongest first."""
+    by_pair: dict[tuple[str, ...], list[dict[str, Any]]] = {}
+    for test in report["next_tests"]:
+        by_pair.setdefault(tuple(test["effects"]), []).append(test)
+    return [
+        {**test, "pair": pair if k == 0 else ()}
+        for pair, tests in by_pair.items()
+        for k, test in enumerate(tests)
+    ]
 
 
 def _parameter_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:

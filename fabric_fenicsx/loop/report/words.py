@@ -1,0 +1,191 @@
+"""What a report says in sentences: no more than the numbers beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...inputs.keys import UNITS, one_of
+from ..inference.criteria import CRITERIA
+
+__all__ = ["headline", "parameter_unit", "reasons"]
+
+PARAMETER_UNITS = {
+    "N_s_n": "N sⁿ",
+    "1_rad2": "1/rad²",
+    "rad_per_N": "rad/N",
+    "N_mm3": "N mm³",
+    "1_mm": "1/mm",
+    "rad_s": "rad/s",
+    "rad": "rad",
+    "N_s": "N s",
+}
+OTHER_UNITS = {"drift_N_s": "N/s"}
+"""A drift's unit is written like a dashpot's."""
+
+#: Scatter of specimens below which the headline does not name it. Convention.
+SMALL_SCATTER = 0.02
+#: Share by which an error is smaller than another one.
+SMALLER = 0.01
+
+
+def parameter_unit(name: str) -> str:
+    """Unit that stands at the end of a parameter's name; empty if there is none."""
+    if name in OTHER_UNITS:
+        return OTHER_UNITS[name]
+    endings = PARAMETER_UNITS | UNITS
+    return next((text for end, text in endings.items() if name.endswith("_" + end)), "")
+
+
+def headline(report: Mapping[str, Any]) -> str:
+    """The verdict in a few plain sentences: effects, specimens, noise, laboratories.
+
+    What a model scatters by that does not explain the data is not the readings' or specimens' own.
+    """
+    sentences = [_verdict(report)]
+    if report["verdict"] != "unexplained":
+        sentences += [*_specimens(report), *_noise(report)]
+    return " ".join([*sentences, *_laboratories(report)])
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+
+
+def _value(report: Mapping[str, Any], number: float | None) -> str:
+    unit = parameter_unit(report["error"]["quantity"])
+    return "unknown" if number is None else f"{number:.2g} {unit}"
+
+
+def _verdict(report: Mapping[str, Any]) -> str:
+    error = report["error"]
+    before, after = (_value(report, error[when]["holdout"]) for when in ("before", "after"))
+    scatter = f"a reading scatters by {_value(report, error['noise'])}"
+    if report["verdict"] == "no_effect":
+        return (
+            "The baseline model explains the data, no effect has to be added: "
+            f"held-out error {before}{_foreseen(report)}; {scatter}."
+        )
+    if report["verdict"] == "effect_found":
+        names = _listed([effect["name"] for effect in report["effects"]])
+        verb = "explain" if len(report["effects"]) > 1 else "explains"
+        text = (
+            f"{names} {verb} the residual: held-out error {before} before, {after} "
+            f"after{_foreseen(report)}; {scatter}."
+        )
+        for effect in report["effects"]:
+            if effect["rivals"]:
+                text += f" This data cannot tell {effect['name']} from {one_of(effect['rivals'])}."
+        return text
+    fitted = error["before"]["fit"]
+    if report["curve"] is not None:
+        text = (
+            "The readings go one way at one rate: they know the curve of the moment against the "
+            f"angle, which the baseline is not (error {_value(report, fitted)}; {scatter}), "
+            "and not what makes it."
+        )
+        names = report["curve"]["effects"]
+        return text + (f" It may be {one_of(names)}." if names else "")
+    nor = "and no known effect explains it, nor do several of them"
+    text = f"The residual is not noise, {nor}: held-out error {before}; {scatter}."
+    if fitted is not None and fitted <= CRITERIA.scatter * error["noise"]:
+        text = (
+            "The fitted readings are what the baseline says within their noise, the held-out ones "
+            f"are not, {nor}: error {_value(report, fitted)} and {before}; {scatter}."
+        )
+    best = report["best"]
+    if best is not None and best["effects"]:
+        names = _listed([effect["name"] for effect in best["effects"]])
+        left = _value(report, best["error_fit"])
+        text += f" Nearest came {names}, with {left} left in the fitted runs."
+    return text
+
+
+def _foreseen(report: Mapping[str, Any]) -> str:
+    """What the model expects of a held-out error that is more than noise."""
+    expected, found = report["holdout_expected"], report["error"]["after"]["holdout"]
+    if expected is None or found is None or found <= CRITERIA.scatter * report["error"]["noise"]:
+        return ""
+    return f" ({_value(report, expected)} expected)"
+
+
+def _specimens(report: Mapping[str, Any]) -> Iterator[str]:
+    differ = [
+        f"{100.0 * s['share']:.0f} ± {100.0 * s['std']:.0f} % ({name})"
+        for name, s in report["scatter"].items()
+        if s["share"] > max(SMALL_SCATTER, CRITERIA.significant * s["std"])
+    ]
+    if differ:
+        yield f"Specimens differ by {', '.join(differ)}."
+
+
+def _noise(report: Mapping[str, Any]) -> Iterator[str]:
+    noise = report["noise_model"]
+    if noise["other_than_stated"]:
+        yield f"Readings scatter by other than the {_value(report, noise['stated'])} stated."
+    if noise["other_than_white"]:
+        yield f"The noise is {noise['words']}."
+
+
+def _laboratories(report: Mapping[str, Any]) -> Iterator[str]:
+    found = []
+    for lab in report["laboratories"]:
+        name = Path(lab["folder"]).name
+        if lab["foretold"] is None or not lab["size"]:
+            found.append(f"{name} not at all")
+            continue
+        error, expected = (100.0 * lab[key] / lab["size"] for key in ("foretold", "expected"))
+        found.append(f"{name} within {error:.0f} % (expected {expected:.0f} %)")
+    if found:
+        zero = ", but for its zero and drift" if report["own_of_runs"] else ""
+        yield (
+            f"Of each folder's readings{zero} the others foretell, of their size: {_listed(found)}."
+        )
+
+
+def reasons(report: Mapping[str, Any]) -> list[str]:
+    """Why the reported model, and no candidate that has a smaller error or a better criterion."""
+    own = report["criterion"]["after"]
+    tried = [c for c in report["candidates"] if c["criterion"] is not None]
+    if own is None or not tried or report["verdict"] == "unexplained":
+        return []
+    if report["verdict"] == "no_effect":
+        best = min(tried, key=lambda c: float(c["criterion"]))
+        gain = own - best["criterion"]
+        if gain < CRITERIA.decisive:
+            return [
+                f"No effect gains the {CRITERIA.decisive:g} in −2 log evidence that decide: the "
+                f"most is {gain:.1f}".replace("-", "−")
+                + f", of {best['name']}."
+            ]
+        return [
+            f"{best['name']} gains {gain:.1f}, but its amplitude is not {CRITERIA.significant:g} "
+            "standard errors from nothing, or it predicts stretches that are left out no better."
+        ]
+    chosen = [effect["name"] for effect in report["effects"]]
+    found = []
+    for c in (c for c in tried if c["name"] not in chosen):
+        smaller = [
+            f"{words} {_value(report, c[f'error_{kind}'])} against {_value(report, mine)}"
+            for kind, words in (("fit", "fitted"), ("holdout", "held out"))
+            if (mine := report["error"]["after"][kind]) is not None
+            and c[f"error_{kind}"] is not None
+            and c[f"error_{kind}"] < (1.0 - SMALLER) * mine
+        ]
+        if smaller:
+            found.append(_weighed(c, ", ".join(smaller), c["criterion"] - own))
+    return found
+
+
+def _weighed(candidate: Mapping[str, Any], smaller: str, loses: float) -> str:
+    """Why a candidate with a smaller error was not chosen."""
+    text = f"{candidate['name']} has a smaller error ({smaller}), "
+    if loses < 0.0:
+        return text + f"and its criterion is better by {-loses:.1f}: it did not bear scrutiny."
+    if loses < CRITERIA.decisive:
+        return text + f"its criterion is worse by {loses:.1f}: the data do not decide."
+    return text + (
+        f"its criterion is worse by {loses:.0f}: with the parameters, forms, noise and scatter "
+        "that it needs the fitted readings are less likely."
+    )
