@@ -43,7 +43,7 @@ class Criteria:
             not, if the residual has structure; made-up.
         settled: ... up to which no further effect is looked for; made-up.
         scatter: ... and if it has none: nobody knows their noise better; made-up.
-        usual_scatter: of specimens, as a share of a parameter (half-normal prior); convention.
+        usual_scatter: of specimens, as a share of a parameter (half-normal prior); made-up.
         laboratories: ... where they are from several laboratories; published.
         usual_share: of a reading that its noise grows by (half-normal prior); convention.
         stated_within: relative sigma of a noise that was stated; convention.
