@@ -96,7 +96,11 @@ def section(folders: Sequence[Path], report: dict[str, Any]) -> str:
         tried.append((candidate["name"] + mark, *map(number, (gain, *cells))))
     lines += table(*tried)
     lines += [f"{text}\n" for text in (*report["reasons"], *report["doubts"])]
+    pairs: set[tuple[str, ...]] = set()
     for advice in report["next_tests"]:
+        if tuple(advice["effects"]) in pairs:
+            continue
+        pairs.add(tuple(advice["effects"]))
         lines.append(
             f"- {' or '.join(advice['effects'])}: {advice['do']} (separation "
             f"{advice['separation']:.1f}, power {advice['power']:.0%})"
@@ -138,13 +142,12 @@ def _parameters(report: dict[str, Any]) -> list[str]:
     differ = [
         f"{name} {100 * s['share']:.0f} ± {100 * s['std']:.0f} %"
         for name, s in report["scatter"].items()
-        if s["share"] > 0.0
+        if s["share"] > 0.0 and report["verdict"] != "unexplained"
     ]
-    words = "Specimens differ, in the reported model, by: "
-    return lines + ([words + ", ".join(differ) + ".", ""] if differ else [])
+    return lines + ([f"Specimens differ by: {', '.join(differ)}.", ""] if differ else [])
 
 
-def law_section(fitted: pd.DataFrame, file: Path) -> str:
+def law_section(fitted: pd.DataFrame, file: Path, claimed: bool) -> str:
     """The fitted bending law beside a measured one."""
     measured = pd.read_csv(file, comment="#")
     kappa, moment = 1e-3 * measured["curvature_1_per_m"], measured["moment_N"]
@@ -173,7 +176,9 @@ def law_section(fitted: pd.DataFrame, file: Path) -> str:
     lines = [
         "### Its bending law, against a measured one",
         "",
-        f"The fit has seen the shape of the strip only. Bending was measured apart: {origin}",
+        "The fit has seen the shape of the strip only"
+        + ("" if claimed else "; its law is that of the model that came nearest")
+        + f". Bending was measured apart: {origin}",
         "",
         f"Up to {1e3 * grid[-1]:.0f} 1/m the two differ by {np.sqrt(np.mean(ratio**2)):.1%} (root "
         f"mean square), at most by {np.abs(ratio).max():.1%}.",
@@ -198,10 +203,11 @@ def main() -> None:
     sets = [[folder] for folder in given.folders] + [given.together] * bool(given.together)
     for folders in sets:
         with tempfile.TemporaryDirectory() as out:
-            text += section(folders, diagnosed(folders, Path(out)))
+            report = diagnosed(folders, Path(out))
+            text += section(folders, report)
             fitted = Path(out) / "cantilever_law.csv"
             if given.law is not None and fitted.exists():
-                text += law_section(pd.read_csv(fitted), given.law)
+                text += law_section(pd.read_csv(fitted), given.law, bool(report["effects"]))
     PAGE.write_text(text.rstrip() + "\n")
 
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, StrMethodFormatter
 
 from ..inference.diagnosis import Diagnosis
+from ..kinds import kind_of
 from .content import nearest_model
 from .drawing import (
     AFTER,
@@ -53,7 +54,12 @@ def residual_figure(diagnosis: Diagnosis, names: Sequence[str] | None = None) ->
     model = shown_model(diagnosis)
     drawn = [(diagnosis.baseline, "baseline", BEFORE)]
     drawn += [(*model, AFTER)] if model is not None else []
-    sigma = diagnosis.noise_model.sigma(readings)
+    # Readings all over a sheet are on no line, and the model of them has an error of its own.
+    line = "none" if kind_of(diagnosis.experiment.test).scattered else "-"
+    square = diagnosis.noise_model.sigma(readings) ** 2
+    if readings.model_error is not None:
+        square = square + np.sum(readings.model_error**2, axis=1)
+    sigma = np.sqrt(square)
     largest = max(float(np.abs(fit.residual[shown]).max(initial=0.0)) for fit, _, _ in drawn)
     for number, axes in enumerate(panels):
         own = np.flatnonzero(shown & (readings.run == number))
@@ -67,7 +73,8 @@ def residual_figure(diagnosis: Diagnosis, names: Sequence[str] | None = None) ->
             axes.plot(
                 along[own],
                 fit.residual[own],
-                ".-",
+                marker=".",
+                linestyle=line,
                 color=colour,
                 markersize=3,
                 linewidth=0.5,
@@ -129,21 +136,26 @@ def dependence_figure(diagnosis: Diagnosis) -> Figure | None:
 
 
 def noise_figure(diagnosis: Diagnosis) -> Figure:
-    """Whether what is left is the noise it is taken for: its correlation and its size."""
+    """Whether what is left is the noise it is taken for: its correlation and its size.
+
+    Readings that are in no line have no correlation that could be shown.
+    """
     model = nearest_model(diagnosis)
     readings, rows, noise = model.readings, model.used, model.variances.noise
-    figure = blank(2.8)
-    left, right = figure.subplots(1, 2)
     found, counts = autocorrelation(model.white, readings.chain[rows], LAGS)
-    lags = np.arange(1, len(found) + 1)
-    band = 1.96 / np.sqrt(np.maximum(counts, 1))
-    left.fill_between(lags, -band, band, color=FAINT, linewidth=0, label="95 % of white noise")
-    left.axhline(0.0, color=BEFORE, linewidth=0.8)
-    left.vlines(lags, 0.0, found, color=AFTER)
-    left.plot(lags, found, ".", color=AFTER, label="white residual")
-    left.xaxis.set_major_locator(MaxNLocator(integer=True))
-    left.set_xlabel("readings apart")
-    left.set_ylabel("correlation")
+    figure = blank(2.8)
+    panels = list(figure.subplots(1, 1 + bool(len(found)), squeeze=False).flat)
+    right = panels[-1]
+    if len(found):
+        left, lags = panels[0], np.arange(1, len(found) + 1)
+        band = 1.96 / np.sqrt(counts)
+        left.fill_between(lags, -band, band, color=FAINT, linewidth=0, label="95 % of white noise")
+        left.axhline(0.0, color=BEFORE, linewidth=0.8)
+        left.vlines(lags, 0.0, found, color=AFTER)
+        left.plot(lags, found, ".", color=AFTER, label="white residual")
+        left.xaxis.set_major_locator(MaxNLocator(integer=True))
+        left.set_xlabel("readings apart")
+        left.set_ylabel("correlation")
     size = np.abs(readings.observed)[rows]
     spread = np.abs(model.residual)[rows]
     right.scatter(size, spread, s=5, color=BEFORE, linewidth=0, label="one reading")
@@ -161,7 +173,7 @@ def noise_figure(diagnosis: Diagnosis) -> Figure:
     label = quantity_label(diagnosis.experiment.quantity)
     right.set_xlabel(f"|{label.partition(' [')[0]}| [{label.partition('[')[2]}")
     right.set_ylabel(f"|residual| [{label.partition('[')[2]}")
-    legend(figure, [left, right])
+    legend(figure, panels)
     return figure
 
 
