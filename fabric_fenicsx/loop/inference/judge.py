@@ -24,7 +24,7 @@ from .experiment import Experiment
 from .fitting import Fit, linearised
 from .noise import Whiteness, missed_readings, outliers, whiteness
 from .validation import CrossValidation, cross_validated, fitted_without, parts_by, stretches
-from .variances import Estimate, Variances, chance_of_no_misfit, estimate
+from .variances import Estimate, Variances, averaged, chance_of_no_misfit, estimate
 
 __all__ = ["Judge", "Laboratory", "Misfit", "Model"]
 
@@ -138,6 +138,15 @@ class Judge:
             model.variances,
             given=self.given,
             smooth=smooth,
+            usual_scatter=self._usual,
+        )
+
+    def averaged(self, model: Model) -> Variances:
+        """Components of a model for its standard errors."""
+        return averaged(
+            linearised(self._experiment, model.fit),
+            model.estimate,
+            given=self.given,
             usual_scatter=self._usual,
         )
 

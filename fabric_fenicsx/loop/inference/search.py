@@ -329,14 +329,15 @@ class _Search:
 
     def _refined(self, model: Model) -> Model:
         """A model fitted again with its own noise and scatter; the old one if there is none."""
-        for _ in range(2):
+        for last in (False, True):
+            variances = self.judge.averaged(model) if last else model.estimate.variances
             try:
                 found = fit(
                     self.experiment,
                     model.fit.variants,
                     model.fit.values,
                     model.fit.used,
-                    model.estimate.variances,
+                    variances,
                     deviations=model.fit.deviations,
                 )
             except SolveError:
@@ -371,7 +372,7 @@ class _Search:
             model.fit.variants,
             model.fit.values,
             model.fit.used,
-            model.estimate.variances,
+            self.judge.averaged(model),
             deviations=model.fit.deviations,
             evaluations=CRITERIA.final_evaluations,
         )

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.integrate import trapezoid
 from scipy.interpolate import BSpline
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
@@ -29,7 +30,7 @@ from .criteria import CRITERIA
 from .experiment import Readings
 from .noise import Noise
 
-__all__ = ["Estimate", "Linearised", "Variances", "estimate"]
+__all__ = ["Estimate", "Linearised", "Variances", "averaged", "chance_of_no_misfit", "estimate"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -42,6 +43,8 @@ ENOUGH = 1e-4
 DIFFERENCE = 1e-5
 #: Products of columns that are kept, for different correlations and shares.
 KEPT = 20
+#: Values of a scatter that are tried.
+TRIED = 15
 #: Largest correlation of neighbours; of a single run slower noise is not told from a misfit.
 MOST_CORRELATED, OF_ONE_RUN = 0.9, 0.5
 
@@ -139,6 +142,38 @@ def estimate(
     noise, taus, omega = problem.split(found.x)
     variances = Variances(noise, dict(zip(groups, taus.tolist(), strict=True)))
     return Estimate(variances, omega, restricted, likelihood, problem.white(found.x))
+
+
+def averaged(
+    at: Linearised,
+    found: Estimate,
+    *,
+    given: float | None = None,
+    usual_scatter: float = CRITERIA.usual_scatter,
+) -> Variances:
+    """The components with each τ² as its mean over what it may be, not its likeliest value.
+
+    Of few specimens τ is hardly known, and its likeliest value is too small for standard errors.
+    One τ at a time, the others as found, flat in τ but for its prior.
+    """
+    problem = _Problem(at, given, False, usual_scatter)
+    noise = found.variances.noise
+    problem.floor = noise.floor
+    groups = list(at.specimens)
+    taus = np.array([found.variances.scatter[group] for group in groups])
+    fixed = [0.0, noise.correlation, noise.share**2 / SHARE_UNIT]
+    scatter = {}
+    for k, group in enumerate(groups):
+        tried = np.linspace(0.0, 1.0, TRIED) ** 2 * (3.0 * usual_scatter + 4.0 * taus[k])
+        costs = []
+        for tau in tried:
+            own = taus.copy()
+            own[k] = tau
+            costs.append(problem.cost(np.array([*fixed, *(own**2 / SCATTER_UNIT)]))[0])
+        likely = np.exp(-0.5 * (np.array(costs) - min(costs)))
+        mean = trapezoid(likely * tried**2, tried) / trapezoid(likely, tried)
+        scatter[group] = float(np.sqrt(mean))
+    return Variances(noise, scatter)
 
 
 def chance_of_no_misfit(with_smooth: Estimate, without: Estimate) -> float:
