@@ -207,7 +207,8 @@ def test_start_is_near_for_any_stiffness(C1):
     start = experiment.baseline[0].starts[0]
     # The loads that are tried are a quarter apart.
     assert start == pytest.approx(C1, rel=0.3)
-    found = fit(experiment, (), {"C1_MPa": start}, experiment.readings.fit)
+    known = Variances(Noise(0.1))
+    found = fit(experiment, (), {"C1_MPa": start}, experiment.readings.fit, known)
     assert found.values["C1_MPa"] == pytest.approx(C1, rel=1e-3)
 
 

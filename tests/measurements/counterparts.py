@@ -29,7 +29,7 @@ COUNTERPARTS: dict[str, dict[str, tuple[str, ...]]] = {
         ("thinning", "thickening", "thinning_alone", "thickening_alone"), ("power law",)
     ),
     "shear_locking": {
-        "linear": ("power 1",),
+        "linear": ("power 1", "smooth"),
         "square": ("power 2",),
         "cube": ("power 3",),
         "exponential": ("exponential",),

@@ -1,4 +1,7 @@
-"""Disturbances of a picture frame that are on nobody's list; units as in `shear_effects`."""
+"""Disturbances of a picture frame that are on nobody's list; units as in `shear_effects`.
+
+One of them, a factor of each run's own, is what specimens differ by: no effect is the right answer.
+"""
 
 from __future__ import annotations
 
