@@ -98,7 +98,7 @@ def effects_table(d: Any) -> list[str]:
         if c.fit is None:
             lines.append(f"| {c.effect.name} | {c.p_value:.2g} | no solution | | |")
             continue
-        errors = c.fit.errors_at(d.noise)
+        errors = c.fit.errors
         fitted = ", ".join(f"{n} = {v:.3g} ± {errors[n]:.2g}" for n, v in c.fit.values.items())
         lines.append(
             f"| {c.effect.name} | {c.p_value:.2g} | {fitted} | {c.fit.rms(rows):.2f}° | "

@@ -5,13 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from measurements.advised import every_form
 from measurements.cantilever import Strip, hang
 from scipy.interpolate import CubicSpline
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.search import diagnose_test
-from fabric_fenicsx.loop.inference.starts import fit_from_grid
+from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.cantilever import CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.hanging import HangingTow
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
@@ -297,14 +299,14 @@ def test_parameters_are_recovered(case):
     folder = measured((250.0, 200.0, 150.0, 100.0), effect, sigma=0.1, rng=np.random.default_rng(7))
     experiment = Cantilever([folder])
     start = {"C1_MPa": experiment.baseline[0].starts[0]}
-    base = fit(experiment, (), start, experiment.readings.fit)
+    base = fit(experiment, (), start, experiment.readings.fit, Variances(Noise(0.1)))
     assert base.rms(base.used) > 0.5
-    fits = fit_from_grid(experiment, base, form(experiment, names))
+    fits = every_form(experiment, base, form(experiment, names))
     best = min(fits, key=lambda f: f.sum_of_squares)
     # 72 readings of 0.1 mm: their root mean square is known to 8 %.
     assert best.rms(best.used) == pytest.approx(0.1, abs=0.025)
     for name, value in parameters(own).items():
-        error = best.errors_at(0.1)[name]
+        error = best.std[name]
         assert abs(best.values[name] - value) < 3.0 * error, (name, best.values[name], error)
 
 
@@ -321,7 +323,7 @@ def test_scatter_of_x_is_found(scatter):
     experiment = Cantilever([known])
     assert experiment.scatter == pytest.approx(scatter, abs=0.35)
     start = {"C1_MPa": experiment.baseline[0].starts[0]}
-    base = fit(experiment, (), start, experiment.readings.fit)
+    base = fit(experiment, (), start, experiment.readings.fit, Variances(Noise(0.1)))
     # 100 readings: known to 7 %. A scatter taken for the other would give 0.07 or 0.15 here.
     assert base.rms(base.used) == pytest.approx(0.1, rel=0.2)
 

@@ -14,7 +14,9 @@ from test_demos import demo
 from fabric_fenicsx.errors import InputError, SolveError
 from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
 from fabric_fenicsx.loop.kinds.drape.model import OTHER_MESH, Drape, nearest_next
 from fabric_fenicsx.loop.kinds.drape.shear_field import (
@@ -221,7 +223,7 @@ def test_without_an_effect_the_baseline_explains_the_data(tmp_path):
 def test_a_model_without_parameters_has_nothing_to_fit(tmp_path):
     x, y = marks()
     drape = draped(tmp_path, x, y, angle(x, y))
-    model = fit(drape, (), {}, drape.readings.fit)
+    model = fit(drape, (), {}, drape.readings.fit, Variances(Noise(1.0)))
     assert model.values == model.std == {}
     assert model.freedom == len(x)
     assert model.slopes.shape[1] == 0

@@ -6,61 +6,48 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from linear import Linear, readings
 from measurements.sets import sixty
 
 from fabric_fenicsx.errors import SolveError
-from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.diagnose import read_measurement
-from fabric_fenicsx.loop.inference.experiment import Readings
+from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
 from fabric_fenicsx.loop.inference.fitting import fit
-from fabric_fenicsx.loop.inference.judge import Judge
+from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.inference.validation import cross_validated, parts_by
+from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 
+UNIT = Variances(Noise(1.0))
+START = {"a": 0.0, "b": 0.0}
 
-class Line:
-    """a + b t, read at t < 1 and held out at 3 < t < 4; one sigma is 1."""
 
-    test, quantity, noise, effects, notes = "line", "y", 1.0, (), ()
-    baseline = (Parameter("a", (0.0,)), Parameter("b", (0.0,)))
-
-    def __init__(self, rng):
-        self.t = np.concatenate([np.linspace(0.0, 1.0, 40), np.linspace(3.0, 4.0, 30)])
-        out = self.t > 2.0
-        self.readings = Readings(
-            observed=2.0 - 3.0 * self.t + rng.normal(size=70),
-            run=out.astype(np.int64),
-            holdout=out,
-            usable=np.ones(70, dtype=bool),
-            weight=np.ones(70),
-            names=("fitted", "held out"),
-            covariates={"t": self.t},
-        )
-
-    def predict(self, variants, values):
-        slopes = {"a": np.ones_like(self.t), "b": self.t}
-        return values["a"] + values["b"] * self.t, slopes
-
-    def law(self, variants, values):
-        return None
+def a_line(seed):
+    """A + b t of one specimen, read at t < 1 and held out at 3 < t < 4; one sigma is 1."""
+    t = np.concatenate([np.linspace(0.0, 1.0, 40), np.linspace(3.0, 4.0, 30)])
+    observed = 2.0 - 3.0 * t + np.random.default_rng(seed).normal(size=70)
+    run = (t > 2.0).astype(np.int64)
+    data = readings(observed, run=run, holdout=(1,), specimen=np.zeros_like(run))
+    return Linear(data, {"a": np.ones_like(t), "b": t}, ("a", "b"))
 
 
 def fitted(seed):
-    line = Line(np.random.default_rng(seed))
-    return line, fit(line, (), {"a": 0.0, "b": 0.0}, line.readings.fit)
+    line = a_line(seed)
+    return line, fit(line, (), START, line.readings.fit, UNIT)
 
 
 def test_the_predictive_check_is_the_textbook_s():
     line, model = fitted(1)
     out = line.readings.holdout
-    J = np.column_stack([np.ones_like(line.t), line.t])
+    J = np.column_stack([line.columns["a"], line.columns["b"]])
     C = np.linalg.inv(J[~out].T @ J[~out])
     r = model.residual[out]
     exact = r @ np.linalg.solve(np.eye(out.sum()) + J[out] @ C @ J[out].T, r)
     assert model.predictive_rms(out) == pytest.approx(np.sqrt(exact / out.sum()), rel=1e-9)
     assert np.isnan(model.predictive_rms(np.zeros_like(out)))
-    doubt = model.error_of({"a": np.ones(2), "b": np.array([0.0, 3.5])}, noise=0.0)
-    scatter = np.sqrt(model.sum_of_squares / 38)
+    doubt = model.error_of({"a": np.ones(2), "b": np.array([0.0, 3.5])})
+    scatter = max(1.0, np.sqrt(model.sum_of_squares / 38))
     expected = [np.sqrt(C[0, 0]), np.sqrt(np.array([1, 3.5]) @ C @ np.array([1, 3.5]))]
     assert doubt == pytest.approx(scatter * np.array(expected), rel=1e-9)
 
@@ -78,63 +65,62 @@ def test_an_extrapolated_line_is_no_surprise():
 
 def test_what_the_data_do_not_tell_is_not_certain():
     # Twice the same column: only the sum of both is known, and to 1/sqrt(40).
-    line = Line(np.random.default_rng(3))
-    line.predict = lambda variants, values: (
-        np.full(70, values["a"] + values["b"]),
-        {"a": np.ones(70), "b": np.ones(70)},
-    )
-    model = fit(line, (), {"a": 0.0, "b": 0.0}, line.readings.fit)
-    assert model.errors_at(1.0)["a"] > 1e4 and model.errors_at(1.0)["b"] > 1e4
+    line = a_line(3)
+    line.columns["b"] = np.ones(70)
+    model = fit(line, (), START, line.readings.fit, UNIT)
+    assert model.errors["a"] > 1e4 and model.errors["b"] > 1e4
     assert model.correlated == (("a", "b"),)
     both = {"a": np.ones(1), "b": np.ones(1)}
-    scatter = np.sqrt(model.sum_of_squares / 38)
-    assert model.error_of(both, noise=1.0) == pytest.approx(scatter / np.sqrt(40), rel=1e-4)
+    scatter = max(1.0, np.sqrt(model.sum_of_squares / 38))
+    assert model.error_of(both) == pytest.approx(scatter / np.sqrt(40), rel=1e-4)
     # However large the doubt, what no parameter can change must still be foreseen.
     out = line.readings.holdout
     lost = replace(model, root=1e20 * model.root)
     assert lost.predictive_rms(out) == pytest.approx(np.std(model.residual[out]), rel=1e-6)
 
 
-class Exponential(Line):
+class Exponential(Linear):
     """exp(-a t), which a fit does not reach in two evaluations; without noise."""
 
-    baseline = (Parameter("a", (0.1,)),)
-
     def __init__(self):
-        super().__init__(np.random.default_rng(0))
-        self.readings = replace(self.readings, observed=np.exp(-5.0 * self.t))
+        line = a_line(0)
+        t = line.columns["b"]
+        super().__init__(replace(line.readings, observed=np.exp(-5.0 * t)), {"a": t}, ("a",))
 
-    def predict(self, variants, values):
-        y = np.exp(-values["a"] * self.t)
-        return y, {"a": -self.t * y}
+    def predict(self, variants, values, deviations=NO_DEVIATIONS):
+        y = np.exp(-values["a"] * self.columns["a"])
+        return y, {"a": -self.columns["a"] * y}
 
 
 def test_a_fit_that_ends_at_its_cap_has_not_converged():
     line = Exponential()
-    stopped, done = (
-        fit(line, (), {"a": 0.1}, line.readings.fit, evaluations=count) for count in (2, 60)
-    )
+    rows = line.readings.fit
+    stopped, done = (fit(line, (), {"a": 0.1}, rows, UNIT, evaluations=count) for count in (2, 60))
     assert not stopped.converged and stopped.values["a"] < 4.0
     assert done.converged and done.values["a"] == pytest.approx(5.0, rel=1e-6)
 
 
 def test_parts_that_cannot_be_predicted_are_counted():
-    class Failing(Line):
-        def predict(self, variants, values):
+    class Failing(Linear):
+        starting = False
+
+        def predict(self, variants, values, deviations=NO_DEVIATIONS):
             if values["a"] == 0.0 and values["b"] == 0.0 and self.starting:
                 raise SolveError("no solution at the start")
-            return super().predict(variants, values)
+            return super().predict(variants, values, deviations)
 
-    line = Failing(np.random.default_rng(2))
-    line.starting = False
-    line.readings = replace(line.readings, holdout=np.zeros(70, dtype=bool))
-    judge = Judge(line)
-    model = fit(line, (), {"a": 0.0, "b": 0.0}, judge.rows)
-    whole = judge.cross_validated(model)
-    assert (whole.parts, whole.failed) == (2, 0) and 1.0 < whole.error < 10.0
+    whole = a_line(2)
+    line = Failing(
+        replace(whole.readings, holdout=np.zeros(70, dtype=bool)), whole.columns, ("a", "b")
+    )
+    rows = line.readings.fit
+    model = fit(line, (), START, rows, UNIT)
+    parts = parts_by(line.readings.run, rows)
+    found = cross_validated(line, model, parts)
+    assert (found.parts, found.failed) == (2, 0) and 1.0 < found.error < 10.0
     # The same model with values that have no solution to begin with: no part is predicted.
     line.starting = True
-    none = judge.cross_validated(replace(model, values={"a": 0.0, "b": 0.0}))
+    none = cross_validated(line, replace(model, values=START), parts)
     assert (none.parts, none.failed) == (2, 2) and np.isnan(none.error)
 
 
@@ -168,11 +154,11 @@ def test_every_form_is_fitted_from_its_best_start():
 
 def test_two_rates_do_not_tell_a_power():
     # Any power between nothing and one fits two rates; a negative part would feed the fabric.
-    truth, found = diagnosed(10, "rate_hardening-thinning_alone")
+    _, found = diagnosed(10, "rate_hardening-thinning_alone")
     assert [e.name for e in found.effects] == ["rate_hardening"]
     assert found.rivals["rate_hardening"] == ["crossover_friction"]
     assert found.final.values["c_n_N_s_n"] > 0.0
-    assert found.final.errors_at(truth.noise)["n"] > 1.0
+    assert found.final.errors["n"] > 1.0
     assert found.holdout_after < 0.5 * found.holdout_before
 
 

@@ -100,7 +100,7 @@ def test_a_load_cell_of_each_run_without_a_held_out_run():
     assert found.holdout_after < 1.15 * SIGMA
     assert any("zero" in note for note in found.notes)
     for number, offset in enumerate(offsets, 1):
-        values, std = found.final.values, found.final.errors_at(SIGMA)
+        values, std = found.final.values, found.final.errors
         assert abs(values[f"run{number}_offset_N"] - offset) < 4.0 * std[f"run{number}_offset_N"]
 
 

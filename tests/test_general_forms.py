@@ -21,6 +21,8 @@ from fabric_fenicsx.mechanics.laws.law import Crossing, Times
 from fabric_fenicsx.mechanics.laws.locking import Locking
 
 SHARES = dict.fromkeys(("angle", "duration", "rate", "travel", "curvature", "moment"), 1.0)
+#: Data whose rates are all alike, too.
+SHARES["typical_rate"] = 1.0
 
 
 @cache

@@ -6,15 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from linear import readings
 from measurements.advised import recipes, trials
 from measurements.cantilever import Strip, hang
 from scipy.stats import norm
 
 from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference.effects import Variant
-from fabric_fenicsx.loop.inference.experiment import Readings
+from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.next_tests import best_tests, next_tests, next_tests_report
+from fabric_fenicsx.loop.inference.noise import Noise
+from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds import kind_of
 from fabric_fenicsx.loop.kinds.cantilever import CANTILEVER, CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
@@ -39,6 +42,9 @@ SINE = Added("sine", (), lambda t: 0.02 * np.sin(9.0 * t))
 COSINE = Added("cosine", (), lambda t: 0.2 * np.cos(3.0 * t))
 
 
+KNOWN = Variances(Noise(SIGMA))
+
+
 class Lines:
     """a + b t and what is added, read at times t."""
 
@@ -46,12 +52,9 @@ class Lines:
     baseline = (Parameter("a", (0.0,)), Parameter("b", (0.0,)))
 
     def __init__(self, t, observed):
-        self.t, ones = t, np.ones(len(t))
-        self.readings = Readings(
-            observed, np.zeros(len(t), dtype=np.int64), ones == 0, ones == 1, ones, ("a",), {}
-        )
+        self.t, self.readings = t, readings(observed)
 
-    def predict(self, variants, values):
+    def predict(self, variants, values, deviations=NO_DEVIATIONS):
         slopes = {"a": np.ones_like(self.t), "b": self.t}
         y = values["a"] + values["b"] * self.t
         for v in variants:
@@ -68,7 +71,7 @@ def fitted(one, other, seed=0, times=1):
     line = Lines(t, 1.0 - t + 2.0 * t**2 + noise)
     rows = line.readings.fit
     start = {"a": 0.0, "b": 0.0, "p": 0.0, "q": 0.0}
-    return line, *(fit(line, (v,), start, rows) for v in (one, other))
+    return line, *(fit(line, (v,), start, rows, KNOWN) for v in (one, other))
 
 
 def further(times=1, *, new_specimen=True):
@@ -128,7 +131,7 @@ def test_a_rival_that_is_the_same_is_not_told_apart():
 
 def test_a_form_of_the_rival_that_does_better_counts():
     line, square, cube = fitted(SQUARE, CUBE)
-    same = fit(line, (SQUARE,), {"a": 0.0, "b": 0.0, "p": 0.0}, line.readings.fit)
+    same = fit(line, (SQUARE,), {"a": 0.0, "b": 0.0, "p": 0.0}, line.readings.fit, KNOWN)
     (found,) = best_tests(line, further(), ("a", "b"), [square], [cube, same], SIGMA, {}, draws=0)
     assert found.separation == pytest.approx(0.0, abs=1e-6)
 
@@ -215,7 +218,8 @@ def test_what_each_run_has_of_its_own_a_further_one_has_too():
     fits = []
     for v in (forms["offset"], forms["offset of each run"]):
         start = {p.name: 0.0 for p in (*experiment.baseline, *v.parameters)}
-        fits.append(fit(experiment, (v,), start, experiment.readings.fit))
+        known = Variances(Noise(0.02))
+        fits.append(fit(experiment, (v,), start, experiment.readings.fit, known))
     pair = ("shared", fits[:1], "own", fits[1:])
     found = next_tests(experiment, PICTURE_FRAME, [measurement], [pair], 0.02)
     assert len(found) == 1
@@ -246,7 +250,7 @@ def test_a_strip_upside_down_is_the_elastica_s():
     forms = {e.name: e.variants[0] for e in strips.effects}
     variants = (forms["residual_curvature"], forms["clamp_tilt"])
     start = {"C1_MPa": strips.baseline[0].starts[0], "kappa0_1_mm": 0.0, "tilt_rad": 0.0}
-    model = fit(strips, variants, start, strips.readings.fit)
+    model = fit(strips, variants, start, strips.readings.fit, Variances(Noise(0.1)))
     # Both sides together tell the two apart, which one side hardly does.
     assert model.values["kappa0_1_mm"] == pytest.approx(curvature, rel=0.01)
     assert model.values["tilt_rad"] == pytest.approx(tilt, rel=0.01)

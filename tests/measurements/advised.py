@@ -23,10 +23,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop.diagnose import read_measurement
+from fabric_fenicsx.loop.inference.effects import Variant
 from fabric_fenicsx.loop.inference.experiment import Experiment
 from fabric_fenicsx.loop.inference.fitting import Fit, fit
 from fabric_fenicsx.loop.inference.next_tests import NextTest, next_tests
-from fabric_fenicsx.loop.inference.starts import fit_from_grid
+from fabric_fenicsx.loop.inference.noise import Noise
+from fabric_fenicsx.loop.inference.starts import fit_combinations, signatures
+from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds import kind_of
 from fabric_fenicsx.loop.measurement.proposal import Proposal
 from fabric_fenicsx.loop.measurement.schema import Measurement
@@ -114,23 +117,29 @@ def forms(
 ) -> tuple[Fit, dict[str, list[Fit]]]:
     """The baseline, and models with each of some effects, or all, in their forms, best first."""
     start = {p.name: p.starts[0] for p in experiment.baseline}
-    base = fit(experiment, (), start, experiment.readings.fit)
+    base = fit(experiment, (), start, experiment.readings.fit, Variances(Noise(noise)))
     found = {}
     for effect in experiment.effects:
         if effect.name in names or not names:
-            fits = fit_from_grid(experiment, base, effect.variants)
-            found[effect.name] = sorted(fits, key=lambda f: bic(f, noise))
+            found[effect.name] = sorted(every_form(experiment, base, effect.variants), key=bic)
     return base, {name: fits for name, fits in found.items() if fits}
 
 
-def bic(model: Fit, noise: float) -> float:
+def every_form(experiment: Experiment, base: Fit, variants: Sequence[Variant]) -> list[Fit]:
+    """A fitted baseline with each of some forms added, specimens being alike."""
+    alike, _ = experiment.predict((), base.values)
+    starts = [((v, s),) for v in variants for s in signatures(experiment, base, alike, v)]
+    return fit_combinations(experiment, base, starts, base.variances)
+
+
+def bic(model: Fit) -> float:
     """χ² + k ln n."""
-    return model.sum_of_squares / noise**2 + len(model.values) * np.log(model.used.sum())
+    return model.sum_of_squares + len(model.values) * float(np.log(model.used.sum()))
 
 
-def alike(fits: list[Fit], noise: float) -> list[Fit]:
+def alike(fits: list[Fit]) -> list[Fit]:
     """Those that leave about as little as the best: with more parameters they are rivals too."""
-    return [f for f in fits if f.sum_of_squares < fits[0].sum_of_squares + ALIKE * noise**2]
+    return [f for f in fits if f.sum_of_squares < fits[0].sum_of_squares + ALIKE]
 
 
 def trials(recipe: Recipe, least: float = 0.9, rivals: Sequence[str] = ()) -> Iterator[Trial]:
@@ -146,15 +155,15 @@ def trials(recipe: Recipe, least: float = 0.9, rivals: Sequence[str] = ()) -> It
     kind = kind_of(measured.test)
     experiment = kind.experiment([measured], ())
     base, found = forms(experiment, noise, (true, *rivals) if rivals else ())
-    if true not in found or bic(base, noise) < bic(found[true][0], noise) + ALIKE:
+    if true not in found or bic(base) < bic(found[true][0]) + ALIKE:
         # Nothing is lacking for all that the set shows.
         return
     for rival, fits in found.items():
         # The truth must not be the better fit by far, nor the worse.
-        if rival == true or abs(bic(fits[0], noise) - bic(found[true][0], noise)) > ALIKE:
+        if rival == true or abs(bic(fits[0]) - bic(found[true][0])) > ALIKE:
             continue
         began = time.process_time()
-        pair = (true, alike(found[true], noise), rival, alike(fits, noise))
+        pair = (true, alike(found[true]), rival, alike(fits))
         tests = next_tests(experiment, kind, [measured], [pair], noise)
         seconds = time.process_time() - began
         trial = Trial(recipe.name, recipe.seed, rival, tests, seconds)
@@ -170,7 +179,7 @@ def trials(recipe: Recipe, least: float = 0.9, rivals: Sequence[str] = ()) -> It
             yield trial
             continue
         before = fits[0].sum_of_squares - found[true][0].sum_of_squares
-        yield replace(trial, alike=before / noise**2, gain=gain / noise**2)
+        yield replace(trial, alike=before, gain=gain)
 
 
 def main() -> None:

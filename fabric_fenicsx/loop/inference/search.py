@@ -208,19 +208,17 @@ class _Search:
         for candidate in candidates:
             mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
             candidate.fit = mine[0].fit if mine else None
-        for count in range(2, CRITERIA.most_effects + 1):
+        most = min(CRITERIA.most_effects, max(2, len(self.experiment.effects) // 2))
+        for count in range(2, 1 + min(most, len(self.effects))):
             best = min((m for level in levels for m in level), key=lambda m: m.criterion)
-            if (
-                len(self.effects) < count
-                or not levels[-1]
-                or self.judge.settled(best, levels[0][0])
-            ):
+            if not levels[-1] or self.judge.settled(best, levels[0][0]):
                 break
             self.progress(0.5 + 0.15 * (count - 2), f"fit {count} effects together")
             # With noise as the best model leaves it.
             self._use(best.fit)
             self._base = self._baseline(self._base.values)
-            levels.append(self._together(count))
+            fewer = self._with_these_variances(levels[-1][0])
+            levels.append(self._together(count, fewer))
             self._with_one_less(levels)
         return candidates, [level for level in levels if level]
 
@@ -229,10 +227,32 @@ class _Search:
         linear = ToFirstOrder(self.experiment, self._base, self.variances, self._robust)
         return Screen(self._base, linear, self._signatures)
 
-    def _together(self, count: int) -> list[Model]:
-        """Models of several effects, the best first."""
+    def _added_to(self, model: Fit) -> list[Combination]:
+        """Every form of every other effect beside those of a model, about that model.
+
+        Where a model is far from linear, what lacks beside it is not seen about the baseline.
+        """
+        present, known = self._effects_of(model), set(model.values)
+        alike, _ = self.experiment.predict(model.variants, model.values)
+        return [
+            ((variant, shape),)
+            for effect in self.effects
+            if effect not in present
+            for variant in effect.variants
+            if known.isdisjoint(p.name for p in variant.parameters)
+            for shape in signatures(self.experiment, model, alike, variant)
+        ]
+
+    def _together(self, count: int, fewer: Fit) -> list[Model]:
+        """Models of several effects, the best first.
+
+        Args:
+            count: of effects.
+            fewer: the best model of one effect less.
+        """
         combinations = self._screened().best(CRITERIA.combinations, count)
         fits = self._fitted(combinations, starts=1)
+        fits += self._fitted(self._added_to(fewer), starts=1, base=fewer)
         return self._best_refined(self._weighed([(f, self._effects_of(f)) for f in fits]))
 
     def _with_one_less(self, levels: list[list[Model]]) -> None:
@@ -259,10 +279,23 @@ class _Search:
     def _robust(self) -> float:
         return CRITERIA.far
 
-    def _fitted(self, combinations: Sequence[Combination], starts: int) -> list[Fit]:
+    def _with_these_variances(self, model: Model) -> Fit:
+        """A model fitted with the variances as they are now."""
+        return fit(
+            self.experiment,
+            model.fit.variants,
+            model.fit.values,
+            model.fit.used,
+            self.variances,
+            robust=self._robust,
+        )
+
+    def _fitted(
+        self, combinations: Sequence[Combination], starts: int, base: Fit | None = None
+    ) -> list[Fit]:
         found = fit_combinations(
             self.experiment,
-            self._base,
+            base or self._base,
             combinations,
             self.variances,
             starts=starts,

@@ -43,14 +43,14 @@ def fit_combinations(
     robust: float | None = None,
     known: float = float("inf"),
 ) -> list[Fit]:
-    """Add effects to the fitted baseline: of each combination of forms the most promising shapes.
+    """Add effects to a fitted model: of each combination of forms the most promising shapes.
 
     Each is first judged to first order, from the signatures; the most promising start of each
     combination of forms is fitted, and others that are nearly as good as the best of all.
 
     Args:
         experiment: the test.
-        base: the fitted baseline, about which the signatures are.
+        base: the fitted model, mostly the baseline, about which the signatures are.
         combinations: forms with their shapes.
         variances: what readings and specimens scatter by.
         starts: how many starts of each combination of forms are followed.
@@ -66,7 +66,8 @@ def fit_combinations(
     for combination in combinations:
         start = linear.start(combination)
         if start is not None:
-            by_forms.setdefault(tuple(v for v, _ in combination), []).append(start)
+            forms = (*base.variants, *(v for v, _ in combination))
+            by_forms.setdefault(forms, []).append(start)
     promising: list[tuple[tuple[Variant, ...], _Start]] = []
     for forms, own in by_forms.items():
         own.sort(key=lambda start: start.left)
@@ -171,7 +172,7 @@ class ToFirstOrder:
 
         None where something is not a number.
         """
-        variants = tuple(v for v, _ in combination)
+        variants = (*self._base.variants, *(v for v, _ in combination))
         at = dict(self._base.values)
         slopes: dict[str, Array] = {}
         moved = np.zeros(len(self._base.residual))
