@@ -260,5 +260,16 @@ def test_reasons_stand_where_a_rival_has_a_smaller_error():
     assert "worse by 50" in far
     (none,) = reasons(REPORT | {"candidates": candidates[1:]})
     assert none.endswith("the most is −3.0, of near.")
+    nearest = {"effects": [{"name": "near"}], "error_fit": 0.2}
+    unexplained = REPORT | {"verdict": "unexplained", "candidates": candidates[1:]}
+    assert "than the baseline itself" in headline(unexplained)
+    assert headline(unexplained | {"best": nearest}).endswith("with 0.2 N left in the fitted runs.")
+    assert reasons(unexplained) == []
+    # Both errors are the noise's: what is wrong is the structure, not the held-out readings.
+    assert "structure" in headline(unexplained) and "held-out ones" not in headline(unexplained)
+    far = REPORT["error"] | {"before": {"fit": 0.05, "holdout": 0.5}}
+    assert "held-out ones are not" in headline(unexplained | {"error": far})
+    far = REPORT["error"] | {"before": {"fit": 0.5, "holdout": 0.5}}
+    assert headline(unexplained | {"error": far}).startswith("The residual is not noise")
     (vetoed,) = reasons(REPORT | {"candidates": [candidate("vetoed", 0.04, 0.04, 60.0)]})
     assert vetoed.startswith("vetoed gains 40.0, but")

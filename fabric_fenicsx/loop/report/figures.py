@@ -74,6 +74,7 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
                 s=size,
                 label=kind if len(at) else None,
                 rasterized=len(readings.run) > MANY,
+                zorder=3,
                 **style,
             )
         for start, end in _curves(along[own], readings.observed[own]):
@@ -104,6 +105,7 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
                     along[part],
                     fit.expected[part],
                     color=AFTER,
+                    linewidth=1.0,
                     label=text if first else None,
                     **(curve if scattered else {}),
                 )

@@ -113,7 +113,8 @@ def _figures(
         "residuals": (
             residual_figure(diagnosis, names),
             "What is left, run by run: reading minus model. A model that explains the data leaves "
-            "points without a pattern inside the band.",
+            "points without a pattern inside the band. Where much is missed, the scale is "
+            "logarithmic beyond the noise.",
         ),
         "dependence": (
             dependence_figure(diagnosis),

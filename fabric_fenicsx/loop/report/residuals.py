@@ -83,7 +83,7 @@ def residual_figure(diagnosis: Diagnosis, names: Sequence[str] | None = None) ->
             )
         if largest > TOO_LARGE * diagnosis.noise:
             axes.set_yscale("asinh", linear_width=2.0 * diagnosis.noise)
-            _tens(axes, 3.0 * diagnosis.noise, largest)
+            _tens(axes, 2.0 * diagnosis.noise, largest)
     legend(figure, panels)
     return figure
 

@@ -89,16 +89,25 @@ def _verdict(report: Mapping[str, Any]) -> str:
         return text + (f" It may be {one_of(names)}." if names else "")
     nor = "and no known effect explains it, nor do several of them"
     text = f"The residual is not noise, {nor}: held-out error {before}; {scatter}."
-    if fitted is not None and fitted <= CRITERIA.scatter * error["noise"]:
+    noise, held = CRITERIA.scatter * error["noise"], error["before"]["holdout"]
+    if fitted is not None and fitted <= noise:
+        left = f"error {_value(report, fitted)} and {before}; {scatter}"
         text = (
-            "The fitted readings are what the baseline says within their noise, the held-out ones "
-            f"are not, {nor}: error {_value(report, fitted)} and {before}; {scatter}."
+            "What the baseline leaves is of the size of noise, but has structure that noise has "
+            f"not, {nor}: {left}."
         )
+        if held is None or held > noise:
+            text = (
+                "The fitted readings are what the baseline says within their noise, the held-out "
+                f"ones are not, {nor}: {left}."
+            )
     best = report["best"]
     if best is not None and best["effects"]:
         names = _listed([effect["name"] for effect in best["effects"]])
         left = _value(report, best["error_fit"])
         text += f" Nearest came {names}, with {left} left in the fitted runs."
+    elif report["candidates"]:
+        text += " None comes nearer than the baseline itself, for what it adds."
     return text
 
 
