@@ -226,7 +226,11 @@ class Judge:
         """Whether a model leaves noise alone, or so little else that nothing can be made of it."""
         found = self.misfit(model)
         little = model.fit.rms(model.fit.used) < CRITERIA.settled * found.noise
-        return (little or not found.whiteness.structured) and self.explains(model, baseline)
+        # Held-out runs do not say whether to go on: what is looked for would be for their sake.
+        enough = self.held_rows.any() or self.foretells(model)
+        return bool((little or not found.whiteness.structured) and enough) and self.fits(
+            model, baseline
+        )
 
     def improves(self, model: Model, on: Model) -> bool:
         """Whether stretches of the fitted readings are predicted better than by another model."""
