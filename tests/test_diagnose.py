@@ -128,8 +128,19 @@ def test_the_criterion_is_that_of_the_chosen(diagnosed):
     assert best["criterion"] == pytest.approx(own, abs=0.5)
 
 
-def test_the_unexplained_says_what_came_nearest(diagnosed):
+def test_the_unexplained_says_what_came_nearest(diagnosed, tmp_path):
+    """To wrinkles an even force; to a vibration nothing, as no effect makes it likelier than none.
+
+    What comes and goes within a few readings is noise beside the model, but not white.
+    """
     report = report_of(diagnosed["unlisted-vibration"][1])
+    assert report["best"] is None
+    assert report["whiteness"]["after"]["period"] < 1e-10
+    RECIPES["unlisted-wrinkles"](tmp_path / "set")
+    only = ["--effects", "tension_coupling,load_drift", "--quiet"]
+    assert command("diagnose", tmp_path / "set", "--out", tmp_path / "out", *only) == 0
+    report = report_of(tmp_path / "out")
+    assert report["verdict"] == "unexplained"
     assert report["best"]["effects"] and report["best"]["effects"][0]["name"] in report["headline"]
     assert report["best"]["error_fit"] > 1.5 * report["error"]["noise"]
 
