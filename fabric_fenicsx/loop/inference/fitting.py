@@ -310,7 +310,7 @@ class _Model:
             values=dict(zip(self._names, x[:p].tolist(), strict=True)),
             std=dict(zip(self._names, std[:p].tolist(), strict=True)),
             correlated=tuple((self._names[i], self._names[j]) for i, j in np.argwhere(near)),
-            at_bound=tuple(self._at_bound(x, std, np.asarray(active))),
+            at_bound=tuple(self._at_bound(x, np.linalg.norm(J, axis=0), np.asarray(active))),
             converged=bool(converged),
             residual=residual,
             expected=expected,
@@ -323,11 +323,17 @@ class _Model:
             readings=self._readings,
         )
 
-    def _at_bound(self, x: Array, std: Array, active: Array) -> Iterator[str]:
-        """Parameters on a bound, or so near that their standard error does not see the distance."""
+    def _at_bound(self, x: Array, seen: Array, active: Array) -> Iterator[str]:
+        """Parameters on a bound, or so near that the readings would not see the distance.
+
+        Args:
+            x: unknowns, (n,).
+            seen: change of all readings, white, with each of them, (n,).
+            active: whether the fit ended on a bound, (n,).
+        """
         for k, p in enumerate(self._parameters):
             away = min(float(x[k]) - p.lower, p.upper - float(x[k]))
-            if active[k] or away < NEAR_BOUND * std[k]:
+            if active[k] or 0.0 <= away * seen[k] < NEAR_BOUND:
                 yield p.name
 
     def _deviations(self, x: Array) -> dict[str, Array]:

@@ -26,8 +26,8 @@ ROUNDING = Parameter(
 SHARP = replace(ROUNDING, upper=0.2, starts=(5e-3, 0.05), share_of="typical_rate")
 SLOW = Parameter(
     "saturation_rad_s",
-    (0.1, 1.0),
-    0.05,
+    (0.2, 1.5),
+    0.1,
     20.0,
     meaning="rate at which the dashpot's moment saturates",
     share_of="typical_rate",
