@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 from collections import Counter, defaultdict
@@ -79,16 +80,35 @@ def table(lines: list[Line]) -> str:
     return "\n".join(out)
 
 
+OPENING = """# The loop on an outsider's sets
+
+Folders of measurements made by somebody who had read the contract for data and the paper, but
+neither the program nor its tests (`tests/outside`, whose README says what is made and how fair
+it is), each diagnosed once. Right is the name that was put in, nothing where nothing was, no
+listed name where the effect is on no list. `abs(z) < 2` counts parameters of the baseline
+within two standard errors of the truth; the held-out error is over the noise that was put in,
+and is larger than one by right where the held-out run is of another specimen. Seconds are of
+processor time. Written by
+
+    python -m outside.run FAMILY SEED ... --out results.jsonl
+    python -m outside.table results.jsonl --page FILE
+
+"""
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Print the tables of one or more files of results."""
-    files = argv if argv is not None else sys.argv[1:]
-    lines = [
-        json.loads(text)
-        for name in files
-        for text in Path(name).read_text().splitlines()
-        if text.strip()
-    ]
-    print(table(lines))
+    """Print the tables of one or more files of results, or write a page of them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("files", nargs="+", type=Path)
+    parser.add_argument("--page", type=Path)
+    given = parser.parse_args(argv)
+    texts = (text for file in given.files for text in file.read_text().splitlines())
+    lines = [json.loads(text) for text in texts if text.strip()]
+    seeds = ", ".join(str(seed) for seed in sorted({line["seed"] for line in lines}))
+    if given.page is None:
+        print(table(lines))
+    else:
+        given.page.write_text(f"{OPENING}Seeds: {seeds}.\n\n{table(lines)}\n")
     return 0
 
 
