@@ -210,3 +210,18 @@ def test_nothing_is_named_where_the_fitted_readings_show_nothing():
     for name in ("none-shear-logger", "none-shear-hold"):
         for seed in (12, 16):
             assert diagnosed(seed, name)[1].verdict == "no_effect"
+
+
+def test_what_others_can_stand_for_is_on_no_bound():
+    """Two equal columns, one of them above zero: neither is known, neither is on its bound."""
+    line = a_line(3)
+    line.columns["b"] = np.ones(70)
+    line.baseline = (line.baseline[0], replace(line.baseline[1], lower=0.0))
+    rows = line.readings.fit
+    model = fit(line, (), {"a": 0.5, "b": 0.3}, rows, UNIT)
+    assert model.std["b"] > 1e4 and model.at_bound == ()
+    # Below zero by its data, or of no influence at all, it is.
+    line.columns["b"] = line.columns["b"] * np.linspace(0.0, 1.0, 70)
+    assert fit(line, (), {"a": 0.5, "b": 0.3}, rows, UNIT).at_bound == ("b",)
+    line.columns["b"] = np.zeros(70)
+    assert fit(line, (), {"a": 0.5, "b": 0.3}, rows, UNIT).at_bound == ("b",)
