@@ -25,7 +25,7 @@ from .fitting import Fit, fit, parameters_of
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise, quantum
 from .screen import Screen
-from .starts import Combination, ToFirstOrder, fit_combinations, signatures
+from .starts import SMALL, Combination, ToFirstOrder, fit_combinations, signatures
 from .validation import has_own
 from .variances import Variances
 
@@ -38,8 +38,8 @@ OWN_ZERO = (
 )
 #: Scatter of specimens, as a share, that first fits allow for.
 FIRST_SCATTER = 0.1
-#: Forms whose own variances are looked for, beside the best one of each set of effects.
-MOST_NEAR = 6
+#: Forms whose own variances are looked for, beside the best ones of each set of effects.
+MOST_NEAR, OF_A_SET = 6, 2
 #: Models whose parameters are fitted again with their own variances ...
 REFINED = 3
 #: ... if their criterion is within this of the best.
@@ -312,18 +312,19 @@ class _Search:
     def _weighed(self, found: Sequence[Sketch]) -> list[Model]:
         """Models with their criteria, the best first.
 
-        Of each set of effects the form that is best at first sight, with the variances of the
-        baseline, and all forms that come near the best of all.
+        Of each set of effects the forms that are best at first sight, with variances that are not
+        their own, and all forms that come near the best of all.
         """
         first = [f.size(self._robust) + self.judge.cost(f, effects) for f, effects in found]
-        order = sorted(range(len(found)), key=first.__getitem__)
-        seen: set[frozenset[Effect]] = set()
+        # A form of which nothing is left says nothing of its effect.
+        order = sorted(range(len(found)), key=lambda k: (_nothing_left(found[k][0]), first[k]))
+        seen: list[frozenset[Effect]] = []
         models = []
         for rank, k in enumerate(order):
             fitted, effects = found[k]
             near = rank < MOST_NEAR and first[k] < first[order[0]] + CRITERIA.decisive
-            if near or frozenset(effects) not in seen:
-                seen.add(frozenset(effects))
+            if near or seen.count(frozenset(effects)) < OF_A_SET:
+                seen.append(frozenset(effects))
                 models.append(self.judge.weighed(fitted, effects))
         return sorted(models, key=lambda m: m.criterion)
 
@@ -509,3 +510,11 @@ class _Search:
                     "not be predicted from the others and are not in its error."
                 )
         return notes
+
+
+def _nothing_left(model: Fit) -> bool:
+    """Whether some effect of a model has all its amplitudes on a bound at nothing."""
+    return any(
+        all(p.name in model.at_bound and abs(model.values[p.name]) <= SMALL for p in v.amplitudes)
+        for v in model.variants
+    )
