@@ -158,7 +158,7 @@ def test_every_form_is_fitted_from_its_best_start():
 
 
 def test_two_rates_do_not_tell_a_power_from_friction():
-    """Either fits two rates of one specimen; that friction does not foretell the third is no choice.
+    """Either fits two rates of one specimen; that one foretells the third is not looked at.
 
     A claim is withheld, and the power law is not taken for the held-out run's sake.
     """
