@@ -41,6 +41,7 @@ class Criteria:
         significant: standard errors that an amplitude must be from nothing; convention.
         near: error over noise up to which a model explains what it was fitted to, and what it was
             not, if the residual has structure; made-up.
+        enough: ... up to which a further effect is not claimed, whatever it gains; made-up.
         settled: ... up to which no further effect is looked for; made-up.
         scatter: ... and if it has none: nobody knows their noise better; made-up.
         usual_scatter: of specimens, as a share of a parameter (half-normal prior); made-up.
@@ -80,6 +81,7 @@ class Criteria:
     decisive: float = 10.0
     significant: float = 2.0
     near: float = 1.15
+    enough: float = 1.08
     settled: float = 1.03
     scatter: float = 1.25
     usual_scatter: float = 0.1

@@ -232,6 +232,11 @@ class Judge:
             model, baseline
         )
 
+    def enough(self, model: Model, baseline: Model) -> bool:
+        """Whether so little is left beside noise that no further effect can be claimed."""
+        left = model.fit.rms(model.fit.used)
+        return self.fits(model, baseline) and left < CRITERIA.enough * self.misfit(model).noise
+
     def improves(self, model: Model, on: Model) -> bool:
         """Whether stretches of the fitted readings are predicted better than by another model."""
         mine, other = (self.by_stretches(m.fit).predictive for m in (model, on))

@@ -400,7 +400,9 @@ class _Search:
         """The model of fewest effects that no other beats decisively, if it bears scrutiny."""
         for count, level in enumerate(levels):
             more = [m.criterion for other in levels[count + 1 :] for m in other]
-            if min(more, default=float("inf")) < level[0].criterion - CRITERIA.decisive:
+            beaten = min(more, default=float("inf")) < level[0].criterion - CRITERIA.decisive
+            # What is left may be due to the form of an effect rather than to another one.
+            if beaten and not (count and self.judge.enough(level[0], levels[0][0])):
                 continue
             model = level[0]
             fewer = levels[count - 1][0] if count else None
