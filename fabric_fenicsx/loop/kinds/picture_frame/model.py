@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from math import pi, sqrt
+from math import inf, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -109,7 +109,8 @@ class PictureFrame:
             "duration": max(float(p.time[-1] - p.time[0]) for p in motions),
             "angle": float(np.abs(gamma).max()),
             "rate": float(np.abs(rate).max()),
-            "force": float(np.abs(self.readings.observed).max()),
+            # Not read yet where a run is to be made up.
+            "force": float(np.abs(self.readings.observed).max()) or inf,
             "typical_rate": _typical(np.abs(rate)),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
