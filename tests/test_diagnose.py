@@ -313,6 +313,7 @@ def test_two_ranks_report_the_same(diagnosed, tmp_path):
     assert process.stderr.count(b"measurement.yaml") == 1
 
 
+@pytest.mark.slow
 def test_two_ranks_report_the_same_of_a_cantilever(tmp_path):
     RECIPES["clamp_tilt-down"](tmp_path / "set")
     assert command("diagnose", tmp_path / "set", "--out", tmp_path / "one", "--quiet") == 0

@@ -138,6 +138,7 @@ def diagnosed(seed, name, specimen=""):
     return truth, diagnose_test(PictureFrame([replace(measurement, runs=runs)]))
 
 
+@pytest.mark.slow
 def test_free_travel_is_found_beyond_the_next_reading():
     # Each reading that comes to lie on the other side of the engagement is a step in the sum of
     # squares: from the nearest start least squares stays at 6.00 mm.
