@@ -50,7 +50,6 @@ class Criteria:
         stated_within: relative sigma of a noise that was stated; convention.
         readings_per_knot, most_knots: of the smooth line that a misfit is looked for with;
             convention.
-        accuracy: share of the range that a reading is good to where no noise is given; published.
         blocks: parts, of several stretches each, that are left out in turn where there is one run;
             convention.
         stretches: in each of these parts; convention.
@@ -90,7 +89,6 @@ class Criteria:
     stated_within: float = 0.15
     readings_per_knot: int = 8
     most_knots: int = 20
-    accuracy: float = 0.005
     blocks: int = 5
     stretches: int = 4
     most_effects: int = 3

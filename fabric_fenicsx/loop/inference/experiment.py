@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from .effects import Effect, Parameter, Variant
 
-__all__ = ["NO_DEVIATIONS", "Deviations", "Experiment", "Law", "OneCurve", "Readings"]
+__all__ = ["NO_DEVIATIONS", "Deviations", "Experiment", "Law", "OneCurve", "Readings", "deviated"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -100,6 +100,30 @@ class OneCurve:
     y: str
     at: Array
     per_reading: Array
+
+
+def deviated(
+    expected: Array,
+    slopes: Mapping[str, Array],
+    values: Mapping[str, float],
+    deviations: Deviations,
+    specimen: Numbers,
+) -> tuple[Array, dict[str, Array]]:
+    """Readings of specimens that differ, and their derivatives, to first order.
+
+    Args:
+        expected: of specimens that are alike, (n,).
+        slopes: of these in the common values, (n,) each.
+        values: the common ones.
+        deviations: of the specimens.
+        specimen: number of each reading's, (n,).
+    """
+    changed = dict(slopes)
+    for name, deviation in deviations.items():
+        own = deviation[specimen]
+        expected = expected + slopes[name] * values[name] * own
+        changed[name] = slopes[name] * (1.0 + own)
+    return expected, changed
 
 
 class Experiment(Protocol):

@@ -279,26 +279,20 @@ class _Model:
 
     def jacobian(self, x: Array) -> Array:
         """Of ``residual``."""
-        white = self._whiten(self._columns(x, self._fitted)[self._used])
-        count = len(x) - len(self._names)
-        prior = np.zeros((count, len(x)))
-        prior[np.arange(count), len(self._names) + np.arange(count)] = 1.0 / self._scatters(
-            len(self._fitted)
-        )
-        return np.concatenate([white, prior])
+        return self._with_prior(self._columns(x, self._fitted), len(self._fitted))
+
+    def _with_prior(self, columns: Array, specimens: int) -> Array:
+        """Columns of all readings, (n, k), as white rows of those fitted, and those of |δ/τ|²."""
+        prior = np.eye(columns.shape[1])[len(self._names) :]
+        prior = prior / self._scatters(specimens)[:, None]
+        return np.concatenate([self._whiten(columns[self._used]), prior])
 
     def fitted(self, x: Array, active: Array, converged: bool) -> Fit:
         """The fit that was found."""
         expected, _ = self._at(x)
         everyone = np.arange(len(self._readings.specimens))
         slopes = self._columns(x, everyone)
-        J = np.concatenate(
-            [
-                self._whiten(slopes[self._used]),
-                np.eye(slopes.shape[1])[len(self._names) :]
-                / self._scatters(len(everyone))[:, None],
-            ]
-        )
+        J = self._with_prior(slopes, len(everyone))
         if not np.isfinite(J).all():
             raise SolveError(f"a derivative in {', '.join(self._names)} is not finite at the fit")
         std, correlation, root = _uncertainty(J)

@@ -53,14 +53,12 @@ class Misfit:
     """What a model leaves beside noise.
 
     Attributes:
-        variances: components with a smooth line through each run allowed for: the noise is what
-            is left of readings next to each other.
-        reading: root mean square of that over the fitted readings.
+        reading: root mean square of sigma over the fitted readings, with a smooth line through
+            each run allowed for: what is left of readings next to each other.
         noise: that and the model's own error, where it is known to have one: what is printed.
         whiteness: tests of what the model leaves.
     """
 
-    variances: Variances
     reading: float
     noise: float
     whiteness: Whiteness
@@ -184,7 +182,7 @@ class Judge:
             error = self._readings.model_error
             own_error = 0.0 if error is None else np.sqrt(np.mean(np.sum(error[rows] ** 2, axis=1)))
             printed = float(np.hypot(noise, own_error))
-            self._misfits[model.fit] = Misfit(lined.variances, noise, printed, white)
+            self._misfits[model.fit] = Misfit(noise, printed, white)
         return self._misfits[model.fit]
 
     def fits(self, model: Model, baseline: Model) -> bool:

@@ -19,7 +19,7 @@ from ...errors import SolveError
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis, Pair, Verdict
-from .effects import Effect
+from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitting import Fit, fit, parameters_of
 from .judge import Judge, Model
@@ -83,7 +83,7 @@ class _Search:
         self._start = {p.name: p.starts[0] for p in experiment.baseline}
         self.variances = self._first_variances()
         fitted = self._baseline(self._start)
-        self._leave_out(fitted)
+        self.judge.leave_out(fitted)
         self._use(self._baseline(fitted.values))
 
     def _first_variances(self) -> Variances:
@@ -110,9 +110,6 @@ class _Search:
             )
         return fit(self.experiment, (), start, rows, self.variances)
 
-    def _leave_out(self, model: Fit) -> bool:
-        return self.judge.leave_out(model)
-
     def _use(self, fitted: Fit) -> None:
         """Take noise and scatter from a model with a smooth line for what it misses."""
         found = self.judge.components(fitted, smooth=True).variances
@@ -126,18 +123,19 @@ class _Search:
         candidates, levels = self._looked_through()
         for _ in range(CRITERIA.rounds):
             # An outlier is seen better once the large part of the residual is gone.
-            nearest = min((m for level in levels for m in level), key=lambda m: m.criterion)
-            if not self._leave_out(nearest.fit):
+            nearest = _nearest(levels)
+            if not self.judge.leave_out(nearest.fit):
                 break
             self._use(nearest.fit)
             candidates, levels = self._looked_through()
         baseline = levels[0][0]
         chosen = self._chosen(levels)
         verdict = self._verdict(baseline, chosen)
-        nearest = min((m for level in levels for m in level), key=lambda m: m.criterion)
+        nearest = _nearest(levels)
         final = chosen if verdict == "effect_found" else baseline
         if final.effects:
-            final = self._final(final)
+            averaged = self.judge.averaged(final)
+            final = self._again(final, averaged, CRITERIA.final_evaluations)
         self.progress(0.9, "rivals")
         judged = final if verdict != "unexplained" else nearest
         misfit = self.judge.misfit(judged)
@@ -210,7 +208,7 @@ class _Search:
             candidate.fit = mine[0].fit if mine else None
         most = min(CRITERIA.most_effects, max(2, len(self.experiment.effects) // 2))
         for count in range(2, 1 + min(most, len(self.effects))):
-            best = min((m for level in levels for m in level), key=lambda m: m.criterion)
+            best = _nearest(levels)
             if not levels[-1] or self.judge.settled(best, levels[0][0]):
                 break
             self.progress(0.5 + 0.15 * (count - 2), f"fit {count} effects together")
@@ -224,7 +222,7 @@ class _Search:
 
     def _screened(self) -> Screen:
         """All effects to first order about the baseline, with the variances as they are now."""
-        linear = ToFirstOrder(self.experiment, self._base, self.variances, self._robust)
+        linear = ToFirstOrder(self.experiment, self._base, self.variances, CRITERIA.far)
         return Screen(self._base, linear, self._signatures)
 
     def _added_to(self, model: Fit) -> list[Combination]:
@@ -266,18 +264,13 @@ class _Search:
         found = []
         for out in best.variants:
             kept = tuple(v for v in best.variants if v is not out)
-            variances = self.variances
             try:
-                found.append(fit(self.experiment, kept, best.values, best.used, variances))
+                found.append(fit(self.experiment, kept, best.values, best.used, self.variances))
             except SolveError:
                 continue
         tried = {m.fit.variants for m in levels[-2]}
         new = [(f, self._effects_of(f)) for f in found if f.variants not in tried]
         levels[-2] = self._best_refined([*levels[-2], *self._weighed(new)])
-
-    @property
-    def _robust(self) -> float:
-        return CRITERIA.far
 
     def _with_these_variances(self, model: Model) -> Fit:
         """A model fitted with the variances as they are now."""
@@ -287,7 +280,7 @@ class _Search:
             model.fit.values,
             model.fit.used,
             self.variances,
-            robust=self._robust,
+            robust=CRITERIA.far,
         )
 
     def _fitted(
@@ -299,7 +292,7 @@ class _Search:
             combinations,
             self.variances,
             starts=starts,
-            robust=self._robust,
+            robust=CRITERIA.far,
         )
         for model in found:
             effects = frozenset(self._effects_of(model))
@@ -307,7 +300,10 @@ class _Search:
         return found
 
     def _effects_of(self, model: Fit) -> tuple[Effect, ...]:
-        return tuple(next(e for e in self.effects if v in e.variants) for v in model.variants)
+        return tuple(self._effect_of(v) for v in model.variants)
+
+    def _effect_of(self, variant: Variant) -> Effect:
+        return next(e for e in self.effects if variant in e.variants)
 
     def _weighed(self, found: Sequence[Sketch]) -> list[Model]:
         """Models with their criteria, the best first.
@@ -315,7 +311,7 @@ class _Search:
         Of each set of effects the forms that are best at first sight, with variances that are not
         their own, and all forms that come near the best of all.
         """
-        first = [f.size(self._robust) + self.judge.cost(f, effects) for f, effects in found]
+        first = [f.size(CRITERIA.far) + self.judge.cost(f, effects) for f, effects in found]
         # A form of which nothing is left says nothing of its effect.
         order = sorted(range(len(found)), key=lambda k: (_nothing_left(found[k][0]), first[k]))
         seen: list[frozenset[Effect]] = []
@@ -333,18 +329,23 @@ class _Search:
         for last in (False, True):
             variances = self.judge.averaged(model) if last else model.estimate.variances
             try:
-                found = fit(
-                    self.experiment,
-                    model.fit.variants,
-                    model.fit.values,
-                    model.fit.used,
-                    variances,
-                    deviations=model.fit.deviations,
-                )
+                model = self._again(model, variances, CRITERIA.evaluations)
             except SolveError:
                 return model
-            model = self.judge.weighed(found, model.effects)
         return model
+
+    def _again(self, model: Model, variances: Variances, evaluations: int) -> Model:
+        """A model fitted again from where it is, with other variances."""
+        found = fit(
+            self.experiment,
+            model.fit.variants,
+            model.fit.values,
+            model.fit.used,
+            variances,
+            deviations=model.fit.deviations,
+            evaluations=evaluations,
+        )
+        return self.judge.weighed(found, model.effects)
 
     def _best_refined(self, models: list[Model]) -> list[Model]:
         """Models, the best first; the best of each set of effects was fitted again.
@@ -365,19 +366,6 @@ class _Search:
             rest = [m for m in rest if m not in same or m.criterion < model.criterion - 1.0]
             refined.append(model)
         return sorted(refined, key=lambda m: m.criterion) + rest
-
-    def _final(self, model: Model) -> Model:
-        """The model as it is reported."""
-        fitted = fit(
-            self.experiment,
-            model.fit.variants,
-            model.fit.values,
-            model.fit.used,
-            self.judge.averaged(model),
-            deviations=model.fit.deviations,
-            evaluations=CRITERIA.final_evaluations,
-        )
-        return self.judge.weighed(fitted, model.effects)
 
     def _by_strength(self, model: Model) -> tuple[Effect, ...]:
         """Effects of a model, that first which changes the expected readings most."""
@@ -446,7 +434,7 @@ class _Search:
             for other in (e for e in self.effects if e not in final.effects):
                 known = [m for m in levels[len(final.effects)] if set(m.effects) == {other, *kept}]
                 if kept and not known:
-                    forms = [v for v in final.fit.variants if self._effects_of_form(v) is not own]
+                    forms = [v for v in final.fit.variants if self._effect_of(v) is not own]
                     fits = self._fitted(self._screened().instead(forms, other), starts=1)
                     known = self._best_refined(
                         self._weighed([(f, self._effects_of(f)) for f in fits])
@@ -477,9 +465,6 @@ class _Search:
         """Those of some fits that leave about as little as the best of them."""
         least = min((f.sum_of_squares for f in fits), default=0.0)
         return [f for f in fits if f.sum_of_squares < least + CRITERIA.decisive]
-
-    def _effects_of_form(self, variant: object) -> Effect:
-        return next(e for e in self.effects if variant in e.variants)
 
     # Words --------------------------------------------------------------------------------
 
@@ -512,6 +497,11 @@ class _Search:
                     "not be predicted from the others and are not in its error."
                 )
         return notes
+
+
+def _nearest(levels: Sequence[Sequence[Model]]) -> Model:
+    """The model with the smallest criterion."""
+    return min((m for level in levels for m in level), key=lambda m: m.criterion)
 
 
 def _nothing_left(model: Fit) -> bool:

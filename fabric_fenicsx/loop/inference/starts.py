@@ -41,7 +41,6 @@ def fit_combinations(
     starts: int = 2,
     evaluations: int = CRITERIA.evaluations,
     robust: float | None = None,
-    known: float = float("inf"),
 ) -> list[Fit]:
     """Add effects to a fitted model: of each combination of forms the most promising shapes.
 
@@ -56,7 +55,6 @@ def fit_combinations(
         starts: how many starts of each combination of forms are followed.
         evaluations: of the model at most, from each.
         robust: see fit.
-        known: sum of squares that some other model leaves.
 
     Returns:
         The model with each combination of forms that has a solution.
@@ -98,7 +96,7 @@ def fit_combinations(
         fits.append(found)
     sizes = [f.size(robust) for f in fits]
     for k, found in enumerate(fits):
-        if sizes[k] <= CRITERIA.worthwhile * min(*sizes, known):
+        if sizes[k] <= CRITERIA.worthwhile * min(sizes):
             if not found.converged:
                 found = _again(experiment, found, found.values, evaluations, robust)
             fits[k] = _around_jumps(experiment, found, evaluations, robust)

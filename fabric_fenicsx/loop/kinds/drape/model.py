@@ -31,7 +31,7 @@ from ....errors import SolveError
 from ....rigs.drape import DrapeCase
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Parameter, Variant
-from ...inference.experiment import NO_DEVIATIONS, Deviations, Readings
+from ...inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ...inference.noise import estimated_noise
 from ...measurement.readings import readings_of
 from ...measurement.schema import Measurement
@@ -300,12 +300,10 @@ class Drape:
         Amplitudes that deviate from sheet to sheet are taken to first order.
         """
         expected, slopes = self._common(variants, values)
-        specimen = self.readings.specimen if deviations else None
-        for name, deviation in deviations.items():
-            own = deviation[specimen]
-            expected = expected + slopes[name] * values[name] * own
-            slopes[name] = slopes[name] * (1.0 + own)
-        return expected, slopes
+        # The first predictions are made before the readings are put together.
+        if not deviations:
+            return expected, slopes
+        return deviated(expected, slopes, values, deviations, self.readings.specimen)
 
     def _common(
         self, variants: Sequence[Variant], values: Mapping[str, float]

@@ -29,7 +29,7 @@ from ....mechanics.laws.springs import PolynomialSpring
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Variant, of_run, scaled
-from ...inference.experiment import NO_DEVIATIONS, Deviations, OneCurve
+from ...inference.experiment import NO_DEVIATIONS, Deviations, OneCurve, deviated
 from ...inference.noise import estimated_noise
 from ...measurement.readings import common_noise, readings_of
 from ...measurement.schema import Measurement
@@ -209,12 +209,10 @@ class PictureFrame:
         deviate by is taken to first order.
         """
         force, slopes = self._common(variants, values)
-        specimen = self.readings.specimen if deviations else None
-        for name, deviation in deviations.items():
-            own = deviation[specimen]
-            force = force + slopes[name] * values[name] * own
-            slopes[name] = slopes[name] * (1.0 + own)
-        return force, slopes
+        # The first predictions are made before the readings are put together.
+        if not deviations:
+            return force, slopes
+        return deviated(force, slopes, values, deviations, self.readings.specimen)
 
     def _common(
         self, variants: Sequence[Variant], values: Mapping[str, float]
