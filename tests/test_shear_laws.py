@@ -5,6 +5,8 @@ have their four ends turned affinely, so that γ is prescribed; the tows are a t
 than real ones, so that they do not bend between the ends and the crossing.
 """
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from ufl import as_ufl, as_vector
@@ -168,10 +170,22 @@ def test_dahl_friction():
     )
 
 
+def test_friction_that_grows_as_the_angle_presses_the_tows_together():
+    """The limit is m_c (1 + a |γ|): twice m_c at 1/a, both ways; Dahl's by its formula there."""
+    path = [0.05, 0.5, 0.25, -0.5]
+    M = moments(CoulombFriction(limit=1.0, stick_angle=0.1, growth=2.0), path)
+    assert M == pytest.approx([0.5, 2.0, -0.5, -2.0])
+    limit, M = 1.0, [0.0]
+    for old, new in pairwise([0.0, *path]):
+        end = np.sign(new - old) * limit * (1.0 + 2.0 * abs(new))
+        M.append(end + (M[-1] - end) * np.exp(-abs((new - old) * limit / 0.1 / end)))
+    assert moments(DahlFriction(limit, 0.1, growth=2.0), path) == pytest.approx(M[1:])
+
+
 def test_friction_is_rate_independent():
     """Ten times as fast the moments are the same; those of a dashpot are ten times as large."""
     path = [0.05, 0.2, 0.1]
-    for law in (CoulombFriction(1.0, 0.1), DahlFriction(1.0, 0.1)):
+    for law in (CoulombFriction(1.0, 0.1), DahlFriction(1.0, 0.1), DahlFriction(1.0, 0.1, 2.0)):
         assert moments(law, path) == pytest.approx(moments(law, path, length=0.1))
     slow, fast = (moments(LinearDashpot(7.0), path, length=h) for h in (1.0, 0.1))
     assert fast == pytest.approx(10.0 * slow)

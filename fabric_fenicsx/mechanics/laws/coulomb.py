@@ -8,12 +8,14 @@ from typing import Any, ClassVar
 
 from ufl import max_value, min_value
 
+from ...inputs.groups import NotNegative
 from ...inputs.parameters import Parameter
-from .law import Crossing, CrossingLaw, Form, Times, in_degrees, per_area
+from .law import Crossing, CrossingLaw, Form, Times, in_degrees, number, per_area
 
-__all__ = ["LIMIT", "CoulombFriction", "friction_numbers"]
+__all__ = ["GROWTH", "LIMIT", "CoulombFriction", "friction_numbers"]
 
 LIMIT = Parameter("m_c_N", lower=0.0, amplitude=True, meaning="friction moment per area")
+GROWTH = Parameter("growth_1_rad", (1.0,), 0.0, 50.0, meaning="of m_c, with the angle")
 
 
 def friction_numbers(
@@ -50,17 +52,19 @@ def _sliders(*multiples: float) -> tuple[dict[str, Any], ...]:
 
 @dataclass(frozen=True)
 class CoulombFriction(CrossingLaw):
-    """Elastic up to a limit, then sliding: the moment never exceeds m_c. ψ = M²/2k of the stick.
+    """Elastic up to a limit m_c (1 + a |γ|), then sliding. ψ = M²/2k of the stick.
 
     Attributes:
         limit: m_c [N mm].
         stick_angle: γ_s [rad], in which the moment grows to the limit: k = m_c/γ_s.
+        growth: a [1/rad], as shear presses the tows together.
     """
 
     limit: Any = per_area("limit_N_mm", "largest moment per area")
     stick_angle: Any = in_degrees(
         "stick_angle_deg", "limit over the stiffness of the stick", default=0.5
     )
+    growth: Any = number("growth_1_rad", "a, growth of the limit with the angle", NotNegative, 0.0)
 
     law = "coulomb_friction"
     name = "Coulomb friction"
@@ -81,10 +85,14 @@ class CoulombFriction(CrossingLaw):
         """Of the stick, dM/dγ [N mm]."""
         return self.limit / self.stick_angle
 
+    def limit_at(self, at: Crossing) -> Any:
+        """Largest moment at the angle at the end of the step [N mm]."""
+        return at.number(self.limit) * (1 + at.number(self.growth) * at.size)
+
     def moment(self, at: Crossing) -> Any:
         """Return mapping: the trial moment, cut at the limits."""
         trial = at.past("moment") + at.number(self.stiffness) * at.change
-        limit = at.number(self.limit)
+        limit = self.limit_at(at)
         return max_value(min_value(trial, limit), -limit)
 
     def history(self, at: Crossing) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from ufl import conditional, exp, ge, max_value, min_value
 
-from .coulomb import CoulombFriction, friction_numbers
+from .coulomb import GROWTH, CoulombFriction, friction_numbers
 from .law import Crossing, Form
 
 __all__ = ["DahlFriction"]
@@ -15,20 +15,29 @@ __all__ = ["DahlFriction"]
 
 @dataclass(frozen=True)
 class DahlFriction(CoulombFriction):
-    """Dahl's smooth friction: dM/dγ = k (1 − M sign(γ̇)/m_c), solved exactly over a step.
+    """Dahl's smooth friction: dM/dγ = k (1 − M sign(γ̇)/m), solved exactly over a step.
 
-    With ψ = M²/2k it loses M² |γ̇|/m_c (P. R. Dahl, AIAA J. 14 (1976) 1675-1682). Its numbers are
-    Coulomb's, the stiffness k being that at reversal of a relaxed contact.
+    With ψ = M²/2k it loses M² |γ̇|/m (P. R. Dahl, AIAA J. 14 (1976) 1675-1682). Its numbers are
+    Coulomb's, the stiffness k being that at reversal of a relaxed contact; the limit
+    m = m_c (1 + a |γ|) is that at the end of the step.
     """
 
     law = "dahl_friction"
     name = "Dahl friction"
-    forms = (Form("crossover_friction", "Dahl", (friction_numbers(),), rank=2),)
+    forms = (
+        Form("crossover_friction", "Dahl", (friction_numbers(),), rank=2),
+        Form(
+            "crossover_friction",
+            "Dahl, growing with the angle",
+            (friction_numbers() | {"growth": GROWTH},),
+            rank=7,
+        ),
+    )
 
     def moment(self, at: Crossing) -> Any:
-        """±m_c + (M_n ∓ m_c) exp(−k |Δγ| / m_c)."""
-        limit = at.number(self.limit)
-        step = at.change * at.number(self.stiffness) / limit
+        """±m + (M_n ∓ m) exp(−k |Δγ| / m)."""
+        limit = self.limit_at(at)
+        step = at.number(self.stiffness) * at.change / limit
         past = at.past("moment")
         forth = limit + (past - limit) * exp(-max_value(step, 0))
         back = -limit + (past + limit) * exp(min_value(step, 0))

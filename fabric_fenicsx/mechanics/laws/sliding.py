@@ -9,7 +9,7 @@ from ufl import max_value, min_value, tanh
 
 from ...inputs.groups import NotNegative
 from ...inputs.parameters import Parameter
-from .coulomb import LIMIT
+from .coulomb import GROWTH, LIMIT
 from .law import Crossing, CrossingLaw, Form, Times, number, per_area
 
 __all__ = ["SlidingFriction"]
@@ -33,7 +33,6 @@ SLOW = Parameter(
     share_of="typical_rate",
 )
 VISCOUS = replace(LIMIT, meaning="largest moment per area of a dashpot that saturates")
-GROWTH = Parameter("growth_1_rad", (1.0,), 0.0, 50.0, meaning="of m_c, with the angle")
 
 
 @dataclass(frozen=True)
