@@ -82,22 +82,24 @@ class Marched:
         self, known: dict[str, Varying], numbers: dict[str, float], shape: tuple[int, ...]
     ) -> dict[str, Varying]:
         """What is remembered before each point, zero before the first."""
-        active = sorted({*numbers, *(p for v in known.values() for p in v.slopes)})
+        # A memory that no parameter goes into is the same loop for every law that has it.
+        own = [p for p in self.parameters if ("given", p) in self._history.steps.operations]
+        active = sorted({*own, *(p for v in known.values() for p in v.slopes)})
         place = {p: k for k, p in enumerate(active)}
         x = np.stack([np.broadcast_to(known[name].value, shape) for name in self.inputs])
         dx = np.zeros((len(self.inputs), len(active), *shape))
         for k, name in enumerate(self.inputs):
             for p, slope in known[name].slopes.items():
                 dx[k, place[p]] = slope
-        values = np.array([numbers[name] for name in self.parameters])
-        slot = np.array([place[name] for name in self.parameters], dtype=int)
+        values = np.array([numbers[name] for name in own])
+        slot = np.array([place[name] for name in own], dtype=int)
         if self._loop is None:
             self._loop = march(
                 self._history.steps,
                 self._history.partials,
                 self.inputs,
                 tuple(self._memory),
-                self.parameters,
+                tuple(own),
             )
         h, dh = self._loop(x, dx, values, slot)
         return {

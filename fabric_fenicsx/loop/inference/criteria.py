@@ -55,6 +55,8 @@ class Criteria:
         stretches: in each of these parts; convention.
         most_effects: in one model; convention.
         combinations: of effects that are fitted, of all that are compared to first order; made-up.
+        terms: that are fitted by themselves, of all effects and terms without a formula that are
+            compared to first order; convention.
         pairs: of rivals, for which a further test is looked for; convention.
         rounds: times that readings are left out, from ever better models; made-up.
         said_correlation: of neighbouring readings, above which the report names it; convention.
@@ -93,6 +95,7 @@ class Criteria:
     stretches: int = 4
     most_effects: int = 3
     combinations: int = 6
+    terms: int = 12
     pairs: int = 4
     rounds: int = 2
     said_correlation: float = 0.15

@@ -19,7 +19,7 @@ __all__ = ["Candidate", "Diagnosis", "Verdict"]
 
 Flags = npt.NDArray[np.bool_]
 Pair = tuple[str, list[Fit], str, list[Fit]]
-Verdict = Literal["no_effect", "effect_found", "unexplained"]
+Verdict = Literal["no_effect", "effect_found", "effect_discovered", "unexplained"]
 
 
 @dataclass(slots=True)

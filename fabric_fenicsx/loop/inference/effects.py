@@ -60,6 +60,9 @@ class Effect:
         variants: its forms.
         of_fabric: whether it is the fabric's, rather than the rig's or what the sheet was before:
             what was fitted beside an effect of the rig is the fabric's law.
+        acts_on: of a term without a formula, what it is added to or a factor of; empty of an
+            effect that has a name.
+        depends_on: of such a term, what it is a function of.
     """
 
     name: str
@@ -67,6 +70,13 @@ class Effect:
     meaning: str
     variants: Sequence[Variant]
     of_fabric: bool = True
+    acts_on: str = ""
+    depends_on: tuple[str, ...] = ()
+
+    @property
+    def listed(self) -> bool:
+        """Whether it is an effect with a name rather than a term without a formula."""
+        return not self.acts_on
 
 
 def scaled(effect: Effect, shares: Mapping[str, float]) -> Effect:

@@ -160,6 +160,11 @@ class Experiment(Protocol):
         ...
 
     @property
+    def terms(self) -> Sequence[Effect]:
+        """Terms without a formula, looked for where none of the candidates will do."""
+        ...
+
+    @property
     def notes(self) -> Sequence[str]:
         """What a reader of the report has to know of the model."""
         ...

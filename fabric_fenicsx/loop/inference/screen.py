@@ -111,6 +111,15 @@ class Screen:
             found.append((score, min(1.0, chance * len(little))))
         return found
 
+    def most_promising(self, count: int) -> list[Effect]:
+        """Effects by what their best form takes off the sum of squares, less what it costs."""
+        gains = self._gains([(g,) for g in self._groups])
+        worth: dict[Effect, float] = {}
+        for group, gain in zip(self._groups, gains, strict=True):
+            net = float(gain) - np.log(self._count) * group.parameters
+            worth[group.effect] = max(worth.get(group.effect, -np.inf), net)
+        return sorted(worth, key=lambda effect: worth[effect], reverse=True)[:count]
+
     def best(self, count: int, effects: int) -> list[Combination]:
         """The most promising combinations of several effects, each in up to three of its forms.
 

@@ -64,7 +64,12 @@ def diagnose_test(
     Raises:
         SolveError: the baseline could not be fitted.
     """
-    return _Search(experiment, names, progress).run()
+    listed = [e for e in experiment.effects if names is None or e.name in names]
+    found = _Search(experiment, listed, progress).run()
+    if found.verdict != "unexplained" or found.curve is not None or names is not None:
+        return found
+    # Nothing that has a name will do: what acts on what, and by what does it go?
+    return _Search(experiment, [*listed, *experiment.terms], progress).run()
 
 
 class _Search:
@@ -73,11 +78,13 @@ class _Search:
     def __init__(
         self,
         experiment: Experiment,
-        names: Sequence[str] | None,
+        effects: Sequence[Effect],
         progress: Callable[[float, str], None],
     ) -> None:
         self.experiment, self.progress = experiment, progress
-        self.effects = [e for e in experiment.effects if names is None or e.name in names]
+        self.effects = list(effects)
+        # With what has no formula there are too many to fit them all.
+        self._screened_first = any(not effect.listed for effect in effects)
         self.judge = Judge(experiment, self.effects)
         self._forms: dict[frozenset[Effect], list[Fit]] = {}
         self._start = {p.name: p.starts[0] for p in experiment.baseline}
@@ -132,7 +139,7 @@ class _Search:
         chosen = self._chosen(levels)
         verdict = self._verdict(baseline, chosen)
         nearest = _nearest(levels)
-        final = chosen if verdict == "effect_found" else baseline
+        final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
         if final.effects:
             averaged = self.judge.averaged(final)
             final = self._again(final, averaged, CRITERIA.final_evaluations)
@@ -197,10 +204,13 @@ class _Search:
             for effect, result in zip(self.effects, screen.scores(self.effects), strict=True)
         ]
         found: list[Sketch] = []
-        for k, candidate in enumerate(candidates):
-            self.progress(0.1 + 0.4 * k / len(candidates), f"fit {candidate.effect.name}")
-            own = [((v, s),) for v, shapes in signs[candidate.effect].items() for s in shapes]
-            found += [(f, (candidate.effect,)) for f in self._fitted(own, starts=2)]
+        tried = self.effects
+        if self._screened_first:
+            tried = screen.most_promising(CRITERIA.terms)
+        for k, effect in enumerate(tried):
+            self.progress(0.1 + 0.4 * k / len(tried), f"fit {effect.name}")
+            own = [((v, s),) for v, shapes in signs[effect].items() for s in shapes]
+            found += [(f, (effect,)) for f in self._fitted(own, starts=2)]
         singles = self._weighed(found)
         levels.append(self._best_refined(singles))
         for candidate in candidates:
@@ -409,7 +419,9 @@ class _Search:
         if self.experiment.one_curve is not None:
             # Every effect can be such a curve: none is told from the others.
             return "unexplained"
-        return "effect_found" if self.judge.explains(chosen, baseline) else "unexplained"
+        if not self.judge.explains(chosen, baseline):
+            return "unexplained"
+        return "effect_found" if all(e.listed for e in chosen.effects) else "effect_discovered"
 
     def _curve(self, model: Model) -> Curve | None:
         known = self.experiment.one_curve

@@ -95,6 +95,7 @@ class Cantilever:
     quantity = "z_mm"
     notes = ()
     one_curve = None
+    terms = ()
 
     def __init__(
         self,

@@ -87,6 +87,7 @@ class Drape:
     quantity = "angle_deg"
     baseline: tuple[Parameter, ...] = ()
     one_curve = None
+    terms = ()
 
     def __init__(
         self,

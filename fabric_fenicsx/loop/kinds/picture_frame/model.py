@@ -35,6 +35,7 @@ from ...measurement.readings import common_noise, readings_of
 from ...measurement.schema import Measurement
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
+from .terms import terms
 from .variant import FrameVariant
 
 __all__ = ["PictureFrame"]
@@ -49,6 +50,8 @@ BASELINE = (
 )
 
 
+#: Time step [s] to the first point of a record.
+BEFORE = 1e-9
 #: Share by which speeds may differ that are one.
 SAME_RATE = 0.1
 
@@ -114,7 +117,33 @@ class PictureFrame:
             "typical_rate": _typical(np.abs(rate)),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
+        self._gamma, self._rate = gamma, rate
         self.effects = [self._with_runs(scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
+
+    @property
+    def terms(self) -> list[Effect]:
+        """Terms without a formula over what the fitted readings reached."""
+        rows = self.readings.fit
+
+        def most(values: Any) -> float:
+            return float(np.abs(self._at_readings(values)[rows]).max())
+
+        D, speed, time = (self._points[name] for name in ("D", "D_rate", "time"))
+        change = np.diff(self._kinematics(self._travel(None, {}), {})["gamma"].value, axis=0)
+        path = np.concatenate([np.zeros_like(D.value[:1]), np.cumsum(np.abs(change), axis=0)])
+        force = self.readings.observed[rows]
+        ranges = {
+            "angle": float(np.abs(self._gamma[rows]).max()),
+            "rate": float(np.abs(self._rate[rows]).max()),
+            "path": most(path),
+            "time": most(time.value - time.value[0]),
+            "displacement": most(D.value),
+            "speed": most(speed.value),
+            "acceleration": most(self._per_second(speed).value),
+            "force": float(np.abs(force).max()),
+            "force_rate": float(np.abs(force).max() / max(np.median(time.value[-1]), 1e-9)),
+        }
+        return terms(ranges)
 
     def _start(self) -> None:
         """Begin fits of the baseline with its least squares, which are linear."""
@@ -165,7 +194,9 @@ class PictureFrame:
             rows = np.flatnonzero(p.reading >= 0)
             places.append((rows[np.argsort(p.reading[rows])], np.full(len(p.certain), r)))
         self._place = tuple(np.concatenate(part) for part in zip(*places, strict=True))
-        step = np.diff(time, axis=0, prepend=time[:1] - 1.0)
+        step = np.diff(time, axis=0, prepend=time[:1])
+        # Nothing has happened before the first point.
+        step[0] = BEFORE
         self._points = {
             "time": Varying(time),
             "D": Varying(D),
@@ -221,19 +252,20 @@ class PictureFrame:
         mine = [v for v in variants if isinstance(v, FrameVariant)]
         travels = [v for v in mine if v.travel is not None]
         travel = self._travel(travels[0] if travels else None, values)
-        known = self._kinematics(travel, values)
-        moments = [self._moment(None, known, values)]
-        moments += [self._moment(v, known, values) for v in mine if v.laws is not None]
-        factor = known["factor"]
-        force = sum(m.value for m in moments) * factor.value
-        slopes: dict[str, Any] = {}
-        for m in moments:
-            for p, slope in m.slopes.items():
-                slopes[p] = slopes.get(p, 0.0) + slope * factor.value
-            for p, slope in factor.slopes.items():
-                slopes[p] = slopes.get(p, 0.0) + m.value * slope
+        whole = self._force(travel, mine, values)
+        for v in mine:
+            if v.added_travel is not None:
+                # The force with the travel as it would be without: what is added is little.
+                ahead = self._added(v, "travel", whole, values)
+                whole = self._force(self._moved(travel, ahead), mine, values)
+        force, slopes = whole.value, dict(whole.slopes)
         zeros: list[tuple[Flags, Array]] = []
         for v in mine:
+            if v.added_reading is not None:
+                added = self._added(v, "reading", whole, values)
+                force = force + added.value
+                for p, slope in added.slopes.items():
+                    slopes[p] = slopes.get(p, 0.0) + slope
             if v.reading is not None:
                 if v.each_run:
                     added, own_zeros = self._each_run(v, values, force)
@@ -269,6 +301,72 @@ class PictureFrame:
             self._compiled[key] = marched.define({"D": true, "D_rate": rate}, history)
         return self._compiled[key](self._points, values)
 
+    def _force(
+        self, travel: Any, variants: Sequence[FrameVariant], values: Mapping[str, float]
+    ) -> Varying:
+        """Force of the frame at its own displacement [N]."""
+        known = self._kinematics(travel, values)
+        moments = [self._moment(None, known, values)]
+        moments += [self._moment(v, known, values) for v in variants if v.laws is not None]
+        factor = known["factor"]
+        slopes: dict[str, Any] = {}
+        for m in moments:
+            for p, slope in m.slopes.items():
+                slopes[p] = slopes.get(p, 0.0) + slope * factor.value
+            for p, slope in factor.slopes.items():
+                slopes[p] = slopes.get(p, 0.0) + m.value * slope
+        return Varying(sum(m.value for m in moments) * factor.value, slopes)
+
+    def _added(
+        self, variant: FrameVariant, to: str, force: Varying, values: Mapping[str, float]
+    ) -> Varying:
+        """What a form adds to the reading [N] or to the travel [mm]."""
+        key = (variant, to)
+        names = ("time", "displacement", "speed", "acceleration", "force", "force_rate")
+        if key not in self._compiled:
+            expression = variant.added_reading if to == "reading" else variant.added_travel
+            assert expression is not None
+            marched = Marched(names, tuple(p.name for p in variant.parameters))
+            self._compiled[key] = marched.define({"added": expression(marched.at, marched.at)}, {})
+        known = {
+            "time": self._since_start(),
+            "displacement": self._points["D"],
+            "speed": self._points["D_rate"],
+            "acceleration": self._per_second(self._points["D_rate"]),
+            "force": force,
+            "force_rate": self._per_second(force),
+        }
+        return self._compiled[key](known, values)["added"]
+
+    def _since_start(self) -> Varying:
+        """Time in each run [s]."""
+        time = self._points["time"].value
+        return Varying(time - time[0])
+
+    def _per_second(self, x: Varying) -> Varying:
+        """How fast something changes along each record."""
+        time = self._points["time"].value
+
+        def rate(values: Array) -> Array:
+            values = np.broadcast_to(values, time.shape)
+            return np.stack([np.gradient(v, t) for v, t in zip(values.T, time.T, strict=True)], 1)
+
+        return Varying(rate(x.value), {p: rate(slope) for p, slope in x.slopes.items()})
+
+    def _moved(self, travel: Any, ahead: Varying) -> dict[str, Varying]:
+        """A travel with what is added to it, and its rate."""
+
+        def total(a: Varying, b: Varying) -> Varying:
+            slopes: dict[str, Any] = dict(a.slopes)
+            for p, slope in b.slopes.items():
+                slopes[p] = slopes.get(p, 0.0) + slope
+            return Varying(a.value + b.value, slopes)
+
+        return {
+            "D": total(travel["D"], ahead),
+            "D_rate": total(travel["D_rate"], self._per_second(ahead)),
+        }
+
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         """γ at each point and at the one before, γ̇, and force per moment."""
         if "kinematics" not in self._compiled:
@@ -297,9 +395,9 @@ class PictureFrame:
         key = (variant, "moment")
         if key not in self._compiled:
             parameters = self.baseline if variant is None else variant.parameters
-            marched = Marched(
-                ("gamma", "gamma_n", "rate", "per_time"), tuple(p.name for p in parameters)
-            )
+            names = tuple(p.name for p in parameters)
+            names += () if variant is None else variant.of_baseline
+            marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
             at, p = marched.at, marched.at
             if variant is None:
                 laws: tuple[Any, ...] = (

@@ -1,0 +1,229 @@
+"""Terms without a formula: what could act on a crossing, on the load cell or on the travel.
+
+Each is linear in the coefficients of a shape over one variable, or two such at a jump or a decay,
+and stands for whatever law of that variable there is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from math import pi
+from typing import Any
+
+from ufl import cos, max_value, min_value, sin, tanh
+
+from ....inputs.parameters import Parameter
+from ....mechanics.laws.shaped import ShapedLaw, shape_of
+from ...inference.effects import Effect, Values
+from .variant import FrameVariant
+
+__all__ = ["terms"]
+
+#: Numbers of coefficients of a spline.
+SPLINES = (1, 2, 3, 5)
+#: Where a step may begin to be looked for, as a share of the range, and how wide it is.
+PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
+#: Decays, as shares of the range.
+DECAYS = (0.1, 0.3)
+#: Memories, as shares of the longest run.
+MEMORIES = (0.01, 0.05, 0.2)
+#: Angles in which a friction begins to slide [rad].
+STICKS = (0.005, 0.03)
+#: Cycles over the range that a periodic term is looked for with.
+CYCLES = tuple(1.5 + 0.5 * k for k in range(30))
+#: Share of the largest speed below which its sign is rounded.
+SLOW = 1e-3
+
+FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate")
+"""Variables of a fading memory."""
+
+
+def terms(ranges: Mapping[str, float]) -> list[Effect]:
+    """The terms of a picture frame.
+
+    Args:
+        ranges: largest value in the fitted readings of "angle", "rate", "path" [rad], "time" [s],
+            "displacement" [mm], "speed" [mm/s], "force" [N].
+    """
+    largest = dict(ranges)
+    largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
+    largest |= {name: ranges["angle"] for name in ("recent_angle", "recent_largest_angle")}
+    return [*_of_the_crossing(largest), *_of_the_rig(largest)]
+
+
+def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
+    bases: dict[str, tuple[str, ...]] = {
+        "elastic": ("largest_angle", "path", "time", "rate", "unloading", *FORGETFUL),
+        "viscous": ("angle", "largest_angle", "path", "time", "unloading", *FORGETFUL),
+        "dissipative": ("angle", "largest_angle", "path", "time", "unloading", *FORGETFUL),
+        "odd": ("angle",),
+        "even": ("angle",),
+        "odd_in_rate": ("rate",),
+        "even_in_rate": ("rate",),
+    }
+    also = {"viscous": ("rate",), "dissipative": ("direction",)}
+    for base, variables in bases.items():
+        groups: dict[str, list[str]] = {}
+        for variable in variables:
+            groups.setdefault(_reported(variable), []).append(variable)
+        for reported, own in groups.items():
+            name = f"{base}_moment_of_{reported}"
+            forms = [f for v in own for f in _laws(name, base, v, largest)]
+            depends_on = (reported, *also.get(base, ()))
+            about = f"{base.replace('_', ' ')} moment, by {reported.replace('_', ' ')}"
+            yield Effect(
+                name, "picture_frame", about, tuple(forms), acts_on="moment", depends_on=depends_on
+            )
+
+
+def _reported(variable: str) -> str:
+    """What a variable is called in a report."""
+    if variable == "unloading":
+        return "direction"
+    return "history" if variable in FORGETFUL else variable
+
+
+def _laws(
+    name: str, base: str, variable: str, largest: Mapping[str, float]
+) -> Iterator[FrameVariant]:
+    """Forms of a factor of a moment."""
+    fixed: dict[str, Any] = {"base": base, "variable": variable, "reach": largest[variable]}
+    if variable in FORGETFUL:
+        full = largest["time"]
+        starts = tuple(share * full for share in MEMORIES)
+        fixed["memory"] = Parameter(f"{name}_memory_s", starts, starts[0] / 10.0, full)
+    if base == "dissipative":
+        fixed["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-4, 0.3)
+        fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
+    of_baseline = ("k1_N", "k3_N") if base == "elastic" else ()
+    for label, coefficients, numbers in _shapes(name, _wealth(variable)):
+        own = fixed | numbers
+        parameters = [*coefficients, *(n for n in own.values() if isinstance(n, Parameter))]
+        yield FrameVariant(
+            f"{variable.replace('_', ' ')}, {label}",
+            tuple(sorted(parameters, key=lambda p: not p.amplitude)),
+            laws=partial(_law, own | {"coefficients": coefficients}),
+            of_baseline=of_baseline,
+        )
+
+
+def _law(numbers: Mapping[str, Any], values: Values) -> tuple[ShapedLaw, ...]:
+    own = {key: _valued(n, values) for key, n in numbers.items()}
+    if own["base"] == "elastic":
+        own |= {"k1": values["k1_N"], "k3": values["k3_N"]}
+    return (ShapedLaw(**own),)
+
+
+def _valued(given: Any, values: Values) -> Any:
+    """A number, or the value of what is fitted."""
+    if isinstance(given, tuple):
+        return tuple(_valued(one, values) for one in given)
+    return values[given.name] if isinstance(given, Parameter) else given
+
+
+def _wealth(variable: str) -> int:
+    """How many of the splines, which are the more the less else there is to be found."""
+    if variable == "unloading":
+        return 1
+    return 2 if variable in FORGETFUL else len(SPLINES)
+
+
+def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
+    """Shapes over one variable: label, coefficients, other numbers of the shape."""
+    for count in SPLINES[:wealth]:
+        own = tuple(Parameter(f"{name}_{k + 1}", amplitude=True) for k in range(count))
+        yield f"{count} coefficients" if count > 1 else "linear", own, {"shape": "spline"}
+    if wealth == len(SPLINES):
+        one = (Parameter(f"{name}_1", amplitude=True),)
+        place = Parameter(f"{name}_place", PLACES, 0.0, 1.0)
+        width = Parameter(f"{name}_width", WIDTHS, 0.01, 0.5)
+        yield "step", one, {"shape": "step", "place": place, "width": width}
+        decay = Parameter(f"{name}_decay", DECAYS, 0.01, 2.0)
+        yield "saturation", one, {"shape": "saturation", "width": decay}
+
+
+# Rig ------------------------------------------------------------------------------------------
+
+
+def _of_the_rig(largest: Mapping[str, float]) -> Iterator[Effect]:
+    for acts_on, on in (("reading", "added_reading"), ("travel", "added_travel")):
+        for variable, reported in RIG[acts_on].items():
+            name = f"{acts_on}_of_{variable}"
+            forms = [
+                FrameVariant(label, parameters, **{on: added})
+                for label, parameters, added in _added(name, variable, largest)
+            ]
+            about = f"what acts on the {acts_on}, by {' and '.join(reported)}"
+            yield Effect(
+                name,
+                "picture_frame",
+                about,
+                tuple(forms),
+                of_fabric=False,
+                acts_on=acts_on,
+                depends_on=reported,
+            )
+
+
+RIG: dict[str, dict[str, tuple[str, ...]]] = {
+    "reading": {
+        "displacement": ("displacement",),
+        "force": ("force",),
+        "speed": ("rate",),
+        "acceleration": ("acceleration",),
+        "force_rate": ("force", "rate"),
+        "time": ("time",),
+    },
+    "travel": {
+        "displacement": ("displacement",),
+        "force": ("force",),
+        "time": ("time",),
+        "speed": ("direction",),
+    },
+}
+"""What acts on the reading and the travel, and what its variable is called in a report."""
+
+Added = tuple[str, tuple[Parameter, ...], Callable[[Values, Values], Any]]
+
+
+def _added(name: str, variable: str, largest: Mapping[str, float]) -> Iterator[Added]:
+    """Forms of what is added: label, parameters, expression."""
+    reach = largest[variable]
+
+    def share(at: Values) -> Any:
+        return max_value(min_value(at[variable] / reach, 1), -1)
+
+    if variable in ("force_rate", "acceleration"):
+        one = Parameter(f"{name}_1", amplitude=True)
+        yield "linear", (one,), lambda p, at: p[one.name] * at[variable] / reach
+        return
+    if variable == "speed":
+        one = Parameter(f"{name}_1", amplitude=True)
+        yield "sign", (one,), lambda p, at: p[one.name] * tanh(at[variable] / (SLOW * reach))
+        if name.startswith("travel"):
+            return
+    for label, coefficients, numbers in _shapes(name, len(SPLINES)):
+        shapes = tuple(n for n in numbers.values() if isinstance(n, Parameter))
+
+        def spline(p: Values, at: Values, own: Any = coefficients, numbers: Any = numbers) -> Any:
+            given = {key: _valued(n, p) for key, n in numbers.items()}
+            return shape_of(
+                given["shape"],
+                _valued(own, p),
+                given.get("place"),
+                given.get("width"),
+                share(at),
+            )
+
+        yield label, (*coefficients, *shapes), spline
+    if variable in ("time", "displacement"):
+        waves = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))
+        cycles = Parameter(f"{name}_cycles", CYCLES, 1.0, 2.0 * CYCLES[-1])
+
+        def wave(p: Values, at: Values) -> Any:
+            turn = 2.0 * pi * p[cycles.name] * at[variable] / reach
+            # Nothing at the beginning.
+            return p[waves[0].name] * sin(turn) + p[waves[1].name] * (cos(turn) - 1)
+
+        yield "periodic", (*waves, cycles), wave

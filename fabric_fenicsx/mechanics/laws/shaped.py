@@ -1,0 +1,177 @@
+"""Laws without a formula: a factor that is any smooth function of something at the crossing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, Self
+
+from ufl import conditional, exp, gt, lt, max_value, min_value
+
+from ...inputs.groups import NotNegative, Positive
+from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, size_of
+
+__all__ = ["VARIABLES", "ShapedLaw", "shape_of"]
+
+Variable = Literal[
+    "angle",
+    "rate",
+    "largest_angle",
+    "path",
+    "time",
+    "unloading",
+    "recent_angle",
+    "recent_largest_angle",
+    "recent_rate",
+]
+Base = Literal["elastic", "viscous", "dissipative", "odd", "even", "odd_in_rate", "even_in_rate"]
+
+
+def _fading(at: Crossing, memory: Any) -> Any:
+    """What is left of a memory after the step, exp(−Δt/τ)."""
+    return exp(-1 / (at.per_time * memory))
+
+
+def _recent(at: Crossing, x: Any, past: Any, memory: Any) -> Any:
+    """Mean of x over the last τ, the latest counting most: τ ds/dt = x − s."""
+    kept = _fading(at, memory)
+    return kept * past + (1 - kept) * x
+
+
+def _unloading(at: Crossing, past: Any) -> Any:
+    """1 while |γ| falls, 0 while it grows, and as it was in a hold."""
+    more = at.size - size_of(at.gamma_n)
+    return conditional(gt(more, 0), 0.0, conditional(lt(more, 0), 1.0, past))
+
+
+VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
+    "angle": lambda at, past, memory: at.size,
+    "rate": lambda at, past, memory: size_of(at.rate),
+    "largest_angle": lambda at, past, memory: max_value(past, at.size),
+    "path": lambda at, past, memory: past + size_of(at.change),
+    "time": lambda at, past, memory: past + 1 / at.per_time,
+    "unloading": lambda at, past, memory: _unloading(at, past),
+    "recent_angle": lambda at, past, memory: _recent(at, at.size, past, memory),
+    "recent_largest_angle": lambda at, past, memory: max_value(past * _fading(at, memory), at.size),
+    "recent_rate": lambda at, past, memory: _recent(at, size_of(at.rate), past, memory),
+}
+"""What a factor may depend on, from the crossing, its value at the step before, and τ [s].
+
+Angles in rad, the path Σ|Δγ|, the time since the beginning [s]; all but the first two remember.
+"""
+
+AT_HAND = ("angle", "rate")
+"""Those that do not."""
+
+
+def shape_of(kind: str, coefficients: Any, place: Any, width: Any, x: Any) -> Any:
+    """A function of x in [0, 1] that is 0 at 0.
+
+    Args:
+        kind: "spline", a C¹ quadratic one with as many equal pieces less one as coefficients,
+            Σ c_k x^k for the first two, then c_k (x − t_k)₊²; "step", c / (1 + exp(−(x − x₀)/w));
+            "saturation", c (1 − exp(−x/w)).
+        coefficients: of the spline, or c alone.
+        place: x₀ of the step.
+        width: w.
+        x: where.
+    """
+    if kind == "step":
+        return coefficients[0] * (
+            1 / (1 + exp(-(x - place) / width)) - 1 / (1 + exp(place / width))
+        )
+    if kind == "saturation":
+        return coefficients[0] * (1 - exp(-x / width))
+    count = len(coefficients)
+    pieces = max(count - 1, 1)
+    value = coefficients[0] * x
+    for k in range(1, count):
+        from_knot = x if k == 1 else max_value(x - (k - 1) / pieces, 0)
+        value = value + coefficients[k] * from_knot**2
+    return value
+
+
+@dataclass(frozen=True)
+class ShapedLaw(CrossingLaw):
+    """M = base · (c₀ + f(v/v_max)): a factor f of something at the crossing, no formula presumed.
+
+    f is 0 at 0 (see ``shape_of``), and beyond v_max what it is there: nobody has seen more. Where
+    c₀ + f is negative the crossing gives energy away; it is to be had from measurements.
+
+    Attributes:
+        base: of what it is a factor: "elastic" k₁ γ + k₃ γ³, "viscous" γ̇, "dissipative" a friction
+            of limit 1 with a stick, "odd" sign γ, "even" 1, "odd_in_rate" sign γ̇, "even_in_rate" 1.
+        variable: v, see VARIABLES.
+        reach: v_max [rad, rad/s or s].
+        coefficients: of f: [-] of the elastic base, [N mm s] of the viscous one, else [N mm].
+        constant: c₀, as they are.
+        shape: "spline", "step" or "saturation".
+        place, width: of the latter two, as shares of v_max.
+        k1, k3: of the elastic base [N mm].
+        stick_angle: of the dissipative base [rad].
+        memory: τ of a variable that forgets [s].
+    """
+
+    base: Base = number("base", "of what it is a factor", Base)
+    variable: Variable = number("variable", "what the factor depends on", Variable)
+    reach: Any = number("reach", "largest value of the variable that was seen")
+    coefficients: Any = number("coefficients", "of the factor, per area", list[float])
+    constant: Any = number("constant", "of the factor where the variable is nothing", float, 0.0)
+    shape: Literal["spline", "step", "saturation"] = number(
+        "shape", "of the factor", Literal["spline", "step", "saturation"], "spline"
+    )
+    place: Any = number("place", "of a step, as a share of the reach", NotNegative, 0.5)
+    width: Any = number("width", "of a step or a saturation, as a share of it", Positive, 0.1)
+    k1: Any = per_area("k1_N_mm", "linear part of the elastic base", NotNegative, 0.0)
+    k3: Any = per_area("k3_N_mm", "cubic part of the elastic base", NotNegative, 0.0)
+    stick_angle: Any = in_degrees("stick_angle_deg", "of the dissipative base", default=0.5)
+    memory: Any = number("memory_s", "of a variable that forgets", default=1.0)
+
+    law = "shaped"
+
+    @classmethod
+    def of_case(cls, values: Mapping[str, Any], area: float) -> Self:
+        """As of any law; coefficients that are no shares of an elastic moment are per area too."""
+        law = super().of_case(values, area)
+        if law.base == "elastic":
+            return law
+        scaled = tuple(c * area for c in law.coefficients)
+        return replace(law, coefficients=scaled, constant=law.constant * area)
+
+    def variable_at(self, at: Crossing) -> Any:
+        """V at the end of the step."""
+        past = None if self.variable in AT_HAND else at.past("variable")
+        return VARIABLES[self.variable](at, past, at.number(self.memory))
+
+    def factor(self, at: Crossing) -> Any:
+        """c₀ + f at the end of the step."""
+        x = min_value(self.variable_at(at) / at.number(self.reach), 1)
+        coefficients = at.number(tuple(self.coefficients))
+        parts = [coefficients[k] for k in range(len(self.coefficients))]
+        place, width = (at.number(n) for n in (self.place, self.width))
+        return at.number(self.constant) + shape_of(self.shape, parts, place, width, x)
+
+    def moment(self, at: Crossing) -> Any:
+        """The base times the factor."""
+        return self._base_at(at) * self.factor(at)
+
+    def history(self, at: Crossing) -> dict[str, Any]:
+        """The variable, if it remembers, and the moment of the friction over its limit."""
+        history = {} if self.variable in AT_HAND else {"variable": self.variable_at(at)}
+        if self.base == "dissipative":
+            history["stick"] = self._base_at(at)
+        return history
+
+    def _base_at(self, at: Crossing) -> Any:
+        if self.base == "elastic":
+            return at.number(self.k1) * at.gamma + at.number(self.k3) * at.gamma**3
+        if self.base == "viscous":
+            return at.rate
+        if self.base == "dissipative":
+            trial = at.past("stick") + at.change / at.number(self.stick_angle)
+            return max_value(min_value(trial, 1), -1)
+        if self.base == "odd":
+            return signed(at.gamma, 1.0)
+        if self.base == "odd_in_rate":
+            return signed(at.rate, 1.0)
+        return 1.0
