@@ -47,6 +47,7 @@ class Marched:
         self.at: dict[str, Any] = {name: symbol() for name in (*inputs, *parameters)}
         self._memory: dict[str, Any] = {}
         self._loop: Callable[..., Any] | None = None
+        self._outputs: dict[tuple[str, ...], _Differentiated] = {}
 
     def remembered(self, name: str) -> Any:
         """The symbol of a value remembered from the point before."""
@@ -56,10 +57,9 @@ class Marched:
         """Set the expressions: what comes out, and what becomes of each remembered value."""
         self._names = tuple(outputs)
         symbols = self.at | self._memory
-        self._outputs = _Differentiated(list(outputs.values()), symbols)
-        self._history = _Differentiated(
-            [history[name.removeprefix("remembered ")] for name in self._memory], symbols
-        )
+        self._written = list(outputs.values())
+        remembered = [history[name.removeprefix("remembered ")] for name in self._memory]
+        self._history = _Differentiated(remembered, symbols, symbols)
         return self
 
     def __call__(
@@ -72,11 +72,21 @@ class Marched:
         if self._memory:
             known |= self._march(known, numbers, shape)
         at = {name: varying.value for name, varying in known.items()} | numbers
-        results = self._outputs(at)
+        results = self._differentiated(known)(at)
         return {
             name: Varying(np.broadcast_to(value, shape), _chained(partials, known, numbers))
             for name, (value, partials) in zip(self._names, results, strict=True)
         }
+
+    def _differentiated(self, known: Mapping[str, Varying]) -> _Differentiated:
+        """The outputs with derivatives in what depends on a parameter, made when first wanted."""
+        moving = tuple(name for name, varying in known.items() if varying.slopes)
+        if moving not in self._outputs:
+            by = {name: self.at[name] for name in self.parameters}
+            symbols = self.at | self._memory
+            by |= {name: symbols[name] for name in moving}
+            self._outputs[moving] = _Differentiated(self._written, symbols, by)
+        return self._outputs[moving]
 
     def _march(
         self, known: dict[str, Varying], numbers: dict[str, float], shape: tuple[int, ...]
@@ -109,20 +119,27 @@ class Marched:
 
 
 class _Differentiated:
-    """Values of expressions with their partial derivatives in every symbol they depend on.
+    """Values of expressions with their partial derivatives.
+
+    Args:
+        expressions: in the symbols.
+        symbols: of all that is given.
+        by: those that derivatives are taken in, where an expression depends on them.
 
     Attributes:
         steps: the expressions, then the derivatives.
         partials: for each expression, by symbol the number of the derivative.
     """
 
-    def __init__(self, expressions: list[Any], symbols: dict[str, Any]) -> None:
+    def __init__(
+        self, expressions: list[Any], symbols: dict[str, Any], by: Mapping[str, Any]
+    ) -> None:
         flat = list(expressions)
         self.partials: list[dict[str, int]] = []
         for expression in expressions:
             own = {}
-            for name, by in symbols.items():
-                derivative = derivative_of(expression, by)
+            for name, one in by.items():
+                derivative = derivative_of(expression, one)
                 if not (derivative == 0):
                     own[name] = len(flat)
                     flat.append(derivative)

@@ -95,7 +95,7 @@ class Criteria:
     stretches: int = 4
     most_effects: int = 3
     combinations: int = 6
-    terms: int = 12
+    terms: int = 8
     pairs: int = 4
     rounds: int = 2
     said_correlation: float = 0.15

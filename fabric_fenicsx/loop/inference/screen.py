@@ -121,7 +121,7 @@ class Screen:
         return sorted(worth, key=lambda effect: worth[effect], reverse=True)[:count]
 
     def best(self, count: int, effects: int) -> list[Combination]:
-        """The most promising combinations of several effects, each in up to three of its forms.
+        """The most promising sets of effects, each in up to three combinations of their forms.
 
         Args:
             count: of sets of effects.

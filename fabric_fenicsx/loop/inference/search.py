@@ -204,9 +204,7 @@ class _Search:
             for effect, result in zip(self.effects, screen.scores(self.effects), strict=True)
         ]
         found: list[Sketch] = []
-        tried = self.effects
-        if self._screened_first:
-            tried = screen.most_promising(CRITERIA.terms)
+        tried = screen.most_promising(CRITERIA.terms) if self._screened_first else self.effects
         for k, effect in enumerate(tried):
             self.progress(0.1 + 0.4 * k / len(tried), f"fit {effect.name}")
             own = [((v, s),) for v, shapes in signs[effect].items() for s in shapes]

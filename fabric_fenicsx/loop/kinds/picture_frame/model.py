@@ -85,6 +85,8 @@ class PictureFrame:
             for m, run in runs
         ]
         self._lay_out(motions)
+        # Angles and rates of a frame that follows the crosshead; see _kinematics.
+        self._still: dict[str, Varying] | None = None
         self._rig = {
             "frame": Varying(np.array([[m.rig.frame_length_mm for m, _ in runs]])),
             "fabric": Varying(np.array([[m.rig.fabric_length_mm for m, _ in runs]])),
@@ -290,7 +292,7 @@ class PictureFrame:
     def _travel(self, variant: FrameVariant | None, values: Mapping[str, float]) -> Any:
         """True displacement of the frame, and its rate."""
         if variant is None or variant.travel is None:
-            return {"D": self._points["D"], "D_rate": self._points["D_rate"]}
+            return self._points
         key = (variant, "travel")
         if key not in self._compiled:
             marched = Marched(("D", "D_rate"), tuple(p.name for p in variant.parameters))
@@ -322,21 +324,21 @@ class PictureFrame:
     ) -> Varying:
         """What a form adds to the reading [N] or to the travel [mm]."""
         key = (variant, to)
-        names = ("time", "displacement", "speed", "acceleration", "force", "force_rate")
         if key not in self._compiled:
             expression = variant.added_reading if to == "reading" else variant.added_travel
             assert expression is not None
-            marched = Marched(names, tuple(p.name for p in variant.parameters))
+            marched = Marched(variant.of, tuple(p.name for p in variant.parameters))
             self._compiled[key] = marched.define({"added": expression(marched.at, marched.at)}, {})
         known = {
-            "time": self._since_start(),
-            "displacement": self._points["D"],
-            "speed": self._points["D_rate"],
-            "acceleration": self._per_second(self._points["D_rate"]),
-            "force": force,
-            "force_rate": self._per_second(force),
+            "time": self._since_start,
+            "displacement": lambda: self._points["D"],
+            "speed": lambda: self._points["D_rate"],
+            "acceleration": lambda: self._per_second(self._points["D_rate"]),
+            "force": lambda: force,
+            "force_rate": lambda: self._per_second(force),
         }
-        return self._compiled[key](known, values)["added"]
+        marched = self._compiled[key]
+        return marched({name: known[name]() for name in marched.inputs}, values)["added"]
 
     def _since_start(self) -> Varying:
         """Time in each run [s]."""
@@ -381,12 +383,17 @@ class PictureFrame:
                 "factor": at["fabric"] ** 2 / (at["frame"] * sin(theta)),
             }
             self._compiled["kinematics"] = marched.define(outputs, {})
+        if travel is self._points and self._still is not None:
+            return self._still
         shape = travel["D"].value.shape
         rig = {name: Varying(np.broadcast_to(v.value, shape)) for name, v in self._rig.items()}
-        known = self._compiled["kinematics"]({**travel, **rig}, values)
+        known = dict(self._compiled["kinematics"]({**travel, **rig}, values))
         gamma = known["gamma"]
         before = Varying(_shifted(gamma.value), {p: _shifted(s) for p, s in gamma.slopes.items()})
-        return {**known, "gamma_n": before, "per_time": self._points["per_time"]}
+        known |= {"gamma_n": before, "per_time": self._points["per_time"]}
+        if travel is self._points:
+            self._still = known
+        return known
 
     def _moment(
         self, variant: FrameVariant | None, known: dict[str, Varying], values: Mapping[str, float]

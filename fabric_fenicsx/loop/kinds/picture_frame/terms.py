@@ -147,11 +147,13 @@ def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...]
 
 
 def _of_the_rig(largest: Mapping[str, float]) -> Iterator[Effect]:
-    for acts_on, on in (("reading", "added_reading"), ("travel", "added_travel")):
-        for variable, reported in RIG[acts_on].items():
+    for acts_on, variables in RIG.items():
+        for variable, reported in variables.items():
             name = f"{acts_on}_of_{variable}"
             forms = [
-                FrameVariant(label, parameters, **{on: added})
+                FrameVariant(label, parameters, of=(variable,), added_reading=added)
+                if acts_on == "reading"
+                else FrameVariant(label, parameters, of=(variable,), added_travel=added)
                 for label, parameters, added in _added(name, variable, largest)
             ]
             about = f"what acts on the {acts_on}, by {' and '.join(reported)}"

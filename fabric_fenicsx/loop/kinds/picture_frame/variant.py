@@ -24,10 +24,10 @@ class FrameVariant(Variant):
             and the true displacement at the reading before, None unless ``remembers_travel``.
         reading: what the load cell adds [N] at the time t [s].
         remembers_travel: ``travel`` depends on ``past``.
-        added_reading: what the load cell adds [N], from the parameters and what is known at a
-            reading: its ``time`` [s], the crosshead's ``displacement`` [mm] and ``speed`` [mm/s],
-            the ``force`` [N] of the model and how fast that changes, ``force_rate`` [N/s].
+        added_reading: what the load cell adds [N], from the parameters and what ``of`` names.
         added_travel: by how much the frame is ahead of the crosshead [mm], from the same.
+        of: of "time" in the run [s], the crosshead's "displacement" [mm], "speed" [mm/s] and
+            "acceleration" [mm/s²], the "force" [N] of the model and its "force_rate" [N/s].
         of_baseline: parameters of the baseline that ``laws`` needs as well.
         each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
             has. Those of a holdout run can only come from that run: its error is then what is
@@ -40,6 +40,7 @@ class FrameVariant(Variant):
     remembers_travel: bool = False
     added_reading: Callable[[Values, Values], Any] | None = None
     added_travel: Callable[[Values, Values], Any] | None = None
+    of: tuple[str, ...] = ()
     of_baseline: tuple[str, ...] = ()
     each_run: bool = False
 
