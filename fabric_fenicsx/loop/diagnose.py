@@ -25,6 +25,7 @@ from .measurement.reading import read_folder
 from .measurement.schema import Measurement
 from .own_effects import read_effects
 from .report.content import combined_report, test_report
+from .report.discovered import Discovered, discovered_terms
 from .report.page import write_report
 
 __all__ = ["Found", "diagnose", "read_measurement", "read_measurements"]
@@ -100,14 +101,14 @@ def diagnose(
     folder = None if out is None else Path(out)
     if folder is not None:
         prepare_folder(folder, MPI.COMM_SELF)
-    parts: list[tuple[Diagnosis, dict[str, Any]]] = []
+    parts: list[tuple[Diagnosis, dict[str, Any], list[Discovered]]] = []
     for number, (kind, same, experiment) in enumerate(tests):
 
         def part(share: float, what: str, number: int = number) -> None:
             progress((number + share) / len(tests), what)
 
         if kind.needs_others:
-            experiment.take(_fitted(diagnosis for diagnosis, _ in parts))
+            experiment.take(_fitted(diagnosis for diagnosis, _, _ in parts))
             _try_out(experiment, own)
         try:
             diagnosis = diagnose_test(experiment, effects, part)
@@ -124,12 +125,13 @@ def diagnose(
             (1.0 + noise.correlation) / (1.0 - noise.correlation),
             diagnosis.final.variances.scatter,
         )
-        parts.append((diagnosis, test_report(diagnosis, same, advice)))
-    report = combined_report([content for _, content in parts])
+        terms = discovered_terms(diagnosis, 1 + sum(len(found) for _, _, found in parts))
+        parts.append((diagnosis, test_report(diagnosis, same, advice, terms), terms))
+    report = combined_report([content for _, content, _ in parts])
     if folder is not None:
         progress(1.0, "drawing")
         write_report(folder, parts, report)
-    return Found(report, tuple(diagnosis for diagnosis, _ in parts))
+    return Found(report, tuple(diagnosis for diagnosis, _, _ in parts))
 
 
 def _experiments(

@@ -57,6 +57,7 @@ class Criteria:
         combinations: of effects that are fitted, of all that are compared to first order; made-up.
         terms: that are fitted by themselves, of all effects and terms without a formula that are
             compared to first order; convention.
+        most_terms: in one model, terms without a formula among them; convention.
         pairs: of rivals, for which a further test is looked for; convention.
         rounds: times that readings are left out, from ever better models; made-up.
         said_correlation: of neighbouring readings, above which the report names it; convention.
@@ -96,6 +97,7 @@ class Criteria:
     most_effects: int = 3
     combinations: int = 6
     terms: int = 8
+    most_terms: int = 2
     pairs: int = 4
     rounds: int = 2
     said_correlation: float = 0.15

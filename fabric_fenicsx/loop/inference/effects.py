@@ -6,16 +6,35 @@ rather than one formula (friction, locking), it has several variants, and the da
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
 from ...inputs.parameters import Parameter
 
-__all__ = ["Effect", "Parameter", "Values", "Variant", "of_run", "scaled"]
+__all__ = ["Effect", "Parameter", "Shape", "Values", "Variant", "of_run", "scaled"]
 
 Values = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What a term without a formula is over its variable.
+
+    Attributes:
+        x: name of the variable with its unit, as a column of a file.
+        y: of what it is a factor, or what is added, likewise.
+        reach: the variable's largest value in the fitted readings.
+        value: from the parameters and the variable's share of its reach, in UFL.
+        fixed: numbers of the term that are not fitted, by name.
+    """
+
+    x: str
+    y: str
+    reach: float
+    value: Callable[[Values, Any], Any]
+    fixed: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,10 +44,12 @@ class Variant:
     Attributes:
         label: what tells it from the others of its effect.
         parameters: its numbers, amplitudes first.
+        shape: of a term without a formula; None of what has one.
     """
 
     label: str
     parameters: tuple[Parameter, ...]
+    shape: Shape | None = None
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:

@@ -46,7 +46,12 @@ class _Group:
     variant: Variant
     signature: Signature
     places: tuple[int, ...]
-    parameters: int
+    names: frozenset[str]
+
+    @property
+    def parameters(self) -> int:
+        """How many it has."""
+        return len(self.names)
 
 
 class Screen:
@@ -78,8 +83,8 @@ class Screen:
                     places = tuple(range(len(columns), len(columns) + own.shape[1]))
                     columns += [np.concatenate([c, padding]) for c in own.T]
                     positive += signs
-                    cost = len(variant.parameters)
-                    self._groups.append(_Group(effect, variant, one, places, cost))
+                    names = frozenset(p.name for p in variant.parameters)
+                    self._groups.append(_Group(effect, variant, one, places, names))
         if not columns:
             columns = [np.zeros(self._count + q)]
             positive = [True]
@@ -220,5 +225,4 @@ def _columns(linear: ToFirstOrder, variant: Variant, one: Signature) -> tuple[Ar
 
 def _compatible(groups: Sequence[_Group]) -> bool:
     """Whether no two forms share the name of a parameter."""
-    names = [p.name for g in groups for p in g.variant.parameters]
-    return len(set(names)) == len(names)
+    return all(a.names.isdisjoint(b.names) for a, b in combinations(groups, 2))

@@ -215,6 +215,8 @@ class _Search:
             mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
             candidate.fit = mine[0].fit if mine else None
         most = min(CRITERIA.most_effects, max(2, len(self.experiment.effects) // 2))
+        if self._screened_first:
+            most = CRITERIA.most_terms
         for count in range(2, 1 + min(most, len(self.effects))):
             best = _nearest(levels)
             if not levels[-1] or self.judge.settled(best, levels[0][0]):
@@ -258,7 +260,8 @@ class _Search:
         """
         combinations = self._screened().best(CRITERIA.combinations, count)
         fits = self._fitted(combinations, starts=1)
-        fits += self._fitted(self._added_to(fewer), starts=1, base=fewer)
+        most = CRITERIA.terms if self._screened_first else None
+        fits += self._fitted(self._added_to(fewer), starts=1, base=fewer, most=most)
         return self._best_refined(self._weighed([(f, self._effects_of(f)) for f in fits]))
 
     def _with_one_less(self, levels: list[list[Model]]) -> None:
@@ -292,7 +295,11 @@ class _Search:
         )
 
     def _fitted(
-        self, combinations: Sequence[Combination], starts: int, base: Fit | None = None
+        self,
+        combinations: Sequence[Combination],
+        starts: int,
+        base: Fit | None = None,
+        most: int | None = None,
     ) -> list[Fit]:
         found = fit_combinations(
             self.experiment,
@@ -300,6 +307,7 @@ class _Search:
             combinations,
             self.variances,
             starts=starts,
+            most=most,
             robust=CRITERIA.far,
         )
         for model in found:

@@ -39,6 +39,7 @@ def fit_combinations(
     variances: Variances,
     *,
     starts: int = 2,
+    most: int | None = None,
     evaluations: int = CRITERIA.evaluations,
     robust: float | None = None,
 ) -> list[Fit]:
@@ -53,6 +54,7 @@ def fit_combinations(
         combinations: forms with their shapes.
         variances: what readings and specimens scatter by.
         starts: how many starts of each combination of forms are followed.
+        most: how many starts are, of all; by default any number.
         evaluations: of the model at most, from each.
         robust: see fit.
 
@@ -70,7 +72,7 @@ def fit_combinations(
     for forms, own in by_forms.items():
         own.sort(key=lambda start: start.left)
         promising += [(forms, start) for start in own[:starts]]
-    promising.sort(key=lambda one: one[1].left)
+    promising = sorted(promising, key=lambda one: one[1].left)[:most]
     fits: list[Fit] = []
     followed: set[tuple[Variant, ...]] = set()
     for forms, start in promising:

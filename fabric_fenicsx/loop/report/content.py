@@ -21,6 +21,7 @@ from ..inference.next_tests import NextTest, next_tests_report
 from ..inference.predictive_check import Check, predictive_check
 from ..inference.validation import has_own
 from ..measurement.schema import Measurement, Run
+from .discovered import Discovered, discovered_report
 from .plausibility import correlations, doubts
 from .words import headline, parameter_unit, reasons
 
@@ -30,7 +31,10 @@ SCHEMA = "fabric-report/1"
 
 
 def test_report(
-    diagnosis: Diagnosis, measurements: Sequence[Measurement], advice: Sequence[NextTest] = ()
+    diagnosis: Diagnosis,
+    measurements: Sequence[Measurement],
+    advice: Sequence[NextTest] = (),
+    terms: Sequence[Discovered] = (),
 ) -> dict[str, Any]:
     """The report of one test.
 
@@ -38,6 +42,7 @@ def test_report(
         diagnosis: what was found.
         measurements: the folders that were read, in the order of the experiment's runs.
         advice: further runs that would tell rivals apart.
+        terms: that were discovered.
 
     Returns:
         The content of report.json; a number that is not finite is None.
@@ -50,7 +55,8 @@ def test_report(
         "schema": SCHEMA,
         "test": d.experiment.test,
         "verdict": d.verdict,
-        "effects": [_effect(d, effect) for effect in d.effects],
+        "effects": [_effect(d, effect) for effect in d.effects if effect.listed],
+        "discovered": discovered_report(d, terms),
         "candidates": [
             {
                 "name": c.effect.name,
@@ -252,7 +258,7 @@ def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
     forms = [
         _form(d, model, effect, variant)
         for variant in model.variants
-        for effect in d.experiment.effects
+        for effect in (*d.experiment.effects, *d.experiment.terms)
         if variant in effect.variants
     ]
     return {

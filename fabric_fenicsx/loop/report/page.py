@@ -18,25 +18,31 @@ from ...errors import InputError
 from ...output.files import write_text
 from ...output.page import inline, number, rendered, save_figure
 from ..inference.diagnosis import Diagnosis
+from .discovered import Discovered
 from .drawing import shown_model
+from .effect_file import effect_file
 from .figures import candidates_figure, curve_figure, data_figure, law_figure
 from .law_table import curve_table, law_table
 from .residuals import dependence_figure, noise_figure, residual_figure
 from .words import parameter_unit
 
-__all__ = ["write_report"]
+__all__ = ["Part", "write_report"]
+
+Part = tuple[Diagnosis, Mapping[str, Any], Sequence[Discovered]]
 
 
 def write_report(
     folder: Path,
-    parts: Sequence[tuple[Diagnosis, Mapping[str, Any]]],
+    parts: Sequence[Part],
     report: Mapping[str, Any],
 ) -> None:
     """Write report.html, its figures as PNG files, fitted laws as CSV, and report.json, last.
 
+    Of each term that was discovered its shape and its effect, as CSV and Python, are written too.
+
     Args:
         folder: is there.
-        parts: each test's diagnosis and report, in the order of the tests.
+        parts: each test's diagnosis, report and discovered terms, in the order of the tests.
         report: of all tests.
 
     Raises:
@@ -50,9 +56,13 @@ def write_report(
         raise InputError(f"{folder}: the report cannot be written ({error.strerror})") from error
 
 
-def _write_page(folder: Path, parts: Sequence[tuple[Diagnosis, Mapping[str, Any]]]) -> None:
+def _write_page(folder: Path, parts: Sequence[Part]) -> None:
     sections = []
-    for diagnosis, report in parts:
+    for diagnosis, report, terms in parts:
+        titles = "; ".join(m["title"] or Path(m["folder"]).name for m in report["measurements"])
+        for term in terms:
+            term.table.to_csv(folder / f"{term.name}.csv", index=False)
+            write_text(folder / f"{term.name}.py", effect_file(term, titles))
         model = shown_model(diagnosis)
         law = law_table(diagnosis, model[0] if model is not None else diagnosis.baseline)
         figures = _figures(diagnosis, report, law)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import pi
 from typing import Any, Literal, Self
 
-from ufl import conditional, exp, gt, lt, max_value, min_value
+from ufl import conditional, cos, exp, gt, lt, max_value, min_value, sin, tanh
 
 from ...inputs.groups import NotNegative, Positive
 from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, size_of
@@ -64,30 +65,35 @@ AT_HAND = ("angle", "rate")
 """Those that do not."""
 
 
-def shape_of(kind: str, coefficients: Any, place: Any, width: Any, x: Any) -> Any:
-    """A function of x in [0, 1] that is 0 at 0.
+def shape_of(kind: str, coefficients: Any, x: Any, place: Any = 0.5, width: Any = 0.1) -> Any:
+    """A function of x, from 0 to 1 or on both sides of 0, that is 0 at 0.
 
     Args:
         kind: "spline", a C¹ quadratic one with as many equal pieces less one as coefficients,
             Σ c_k x^k for the first two, then c_k (x − t_k)₊²; "step", c / (1 + exp(−(x − x₀)/w));
-            "saturation", c (1 − exp(−x/w)).
-        coefficients: of the spline, or c alone.
-        place: x₀ of the step.
-        width: w.
+            "saturation", c (1 − exp(−x/w)); "periodic", c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1);
+            "sign", c tanh(x/w).
+        coefficients: c or c_k.
         x: where.
+        place: x₀ of a step.
+        width: w.
     """
+    c = coefficients
     if kind == "step":
-        return coefficients[0] * (
-            1 / (1 + exp(-(x - place) / width)) - 1 / (1 + exp(place / width))
-        )
+        start = 1 / (1 + exp(place / width))
+        return c[0] * (1 / (1 + exp(-(x - place) / width)) - start)
     if kind == "saturation":
-        return coefficients[0] * (1 - exp(-x / width))
-    count = len(coefficients)
-    pieces = max(count - 1, 1)
-    value = coefficients[0] * x
+        return c[0] * (1 - exp(-x / width))
+    if kind == "periodic":
+        turn = 2 * pi * x / width
+        return c[0] * sin(turn) + c[1] * (cos(turn) - 1)
+    if kind == "sign":
+        return c[0] * tanh(x / width)
+    count = len(c)
+    value = c[0] * x
     for k in range(1, count):
-        from_knot = x if k == 1 else max_value(x - (k - 1) / pieces, 0)
-        value = value + coefficients[k] * from_knot**2
+        from_knot = x if k == 1 else max_value(x - (k - 1) / max(count - 1, 1), 0)
+        value = value + c[k] * from_knot**2
     return value
 
 
@@ -149,7 +155,7 @@ class ShapedLaw(CrossingLaw):
         coefficients = at.number(tuple(self.coefficients))
         parts = [coefficients[k] for k in range(len(self.coefficients))]
         place, width = (at.number(n) for n in (self.place, self.width))
-        return at.number(self.constant) + shape_of(self.shape, parts, place, width, x)
+        return at.number(self.constant) + shape_of(self.shape, parts, x, place, width)
 
     def moment(self, at: Crossing) -> Any:
         """The base times the factor."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from math import inf, pi, sqrt
 from typing import Any
 
@@ -122,7 +122,7 @@ class PictureFrame:
         self._gamma, self._rate = gamma, rate
         self.effects = [self._with_runs(scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
 
-    @property
+    @cached_property
     def terms(self) -> list[Effect]:
         """Terms without a formula over what the fitted readings reached."""
         rows = self.readings.fit

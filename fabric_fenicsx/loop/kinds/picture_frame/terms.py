@@ -6,16 +6,15 @@ and stands for whatever law of that variable there is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
-from math import pi
 from typing import Any
 
-from ufl import cos, max_value, min_value, sin, tanh
+from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import ShapedLaw, shape_of
-from ...inference.effects import Effect, Values
+from ...inference.effects import Effect, Shape, Values
 from .variant import FrameVariant
 
 __all__ = ["terms"]
@@ -30,8 +29,8 @@ DECAYS = (0.1, 0.3)
 MEMORIES = (0.01, 0.05, 0.2)
 #: Angles in which a friction begins to slide [rad].
 STICKS = (0.005, 0.03)
-#: Cycles over the range that a periodic term is looked for with.
-CYCLES = tuple(1.5 + 0.5 * k for k in range(30))
+#: Periods, as shares of the range, that a periodic term is looked for with.
+PERIODS = tuple(1.0 / (1.5 + 0.5 * k) for k in range(30))
 #: Share of the largest speed below which its sign is rounded.
 SLOW = 1e-3
 
@@ -77,6 +76,27 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             )
 
 
+X = {
+    "angle": "shear_angle_rad",
+    "rate": "shear_rate_rad_s",
+    "unloading": "unloading",
+    "time": "time_s",
+    "displacement": "displacement_mm",
+    "speed": "speed_mm_s",
+    "acceleration": "acceleration_mm_s2",
+    "force": "force_N",
+    "force_rate": "force_rate_N_s",
+    "recent_rate": "recent_rate_rad_s",
+} | {name: f"{name}_rad" for name in ("largest_angle", "path", "recent_angle")}
+X["recent_largest_angle"] = "recent_largest_angle_rad"
+"""Variables with their units."""
+
+Y = {"elastic": "share_of_elastic_moment", "viscous": "moment_per_rate_N_s"}
+Y |= dict.fromkeys(("dissipative", "odd", "even", "odd_in_rate", "even_in_rate"), "moment_N")
+Y |= {"reading": "reading_N", "travel": "travel_mm"}
+"""What a term is a factor of, or adds, with units."""
+
+
 def _reported(variable: str) -> str:
     """What a variable is called in a report."""
     if variable == "unloading":
@@ -100,12 +120,22 @@ def _laws(
     for label, coefficients, numbers in _shapes(name, _wealth(variable)):
         own = fixed | numbers
         parameters = [*coefficients, *(n for n in own.values() if isinstance(n, Parameter))]
+        own["coefficients"] = coefficients
         yield FrameVariant(
             f"{variable.replace('_', ' ')}, {label}",
             tuple(sorted(parameters, key=lambda p: not p.amplitude)),
-            laws=partial(_law, own | {"coefficients": coefficients}),
+            Shape(X[variable], Y[base], largest[variable], partial(_factor, own), own),
+            laws=partial(_law, own),
             of_baseline=of_baseline,
         )
+
+
+def _factor(numbers: Mapping[str, Any], values: Values, x: Any) -> Any:
+    """A law's factor at a share x of the reach."""
+    own = {key: _valued(n, values) for key, n in numbers.items()}
+    shape = own.pop("shape"), own.pop("coefficients")
+    at = {key: own[key] for key in ("place", "width") if key in own}
+    return own.get("constant", 0.0) + shape_of(*shape, x, **at)
 
 
 def _law(numbers: Mapping[str, Any], values: Values) -> tuple[ShapedLaw, ...]:
@@ -126,7 +156,7 @@ def _wealth(variable: str) -> int:
     """How many of the splines, which are the more the less else there is to be found."""
     if variable == "unloading":
         return 1
-    return 2 if variable in FORGETFUL else len(SPLINES)
+    return 3 if variable in FORGETFUL else len(SPLINES)
 
 
 def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
@@ -134,7 +164,7 @@ def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...]
     for count in SPLINES[:wealth]:
         own = tuple(Parameter(f"{name}_{k + 1}", amplitude=True) for k in range(count))
         yield f"{count} coefficients" if count > 1 else "linear", own, {"shape": "spline"}
-    if wealth == len(SPLINES):
+    if wealth > 1:
         one = (Parameter(f"{name}_1", amplitude=True),)
         place = Parameter(f"{name}_place", PLACES, 0.0, 1.0)
         width = Parameter(f"{name}_width", WIDTHS, 0.01, 0.5)
@@ -150,12 +180,7 @@ def _of_the_rig(largest: Mapping[str, float]) -> Iterator[Effect]:
     for acts_on, variables in RIG.items():
         for variable, reported in variables.items():
             name = f"{acts_on}_of_{variable}"
-            forms = [
-                FrameVariant(label, parameters, of=(variable,), added_reading=added)
-                if acts_on == "reading"
-                else FrameVariant(label, parameters, of=(variable,), added_travel=added)
-                for label, parameters, added in _added(name, variable, largest)
-            ]
+            forms = _of_rig(acts_on, name, variable, largest[variable])
             about = f"what acts on the {acts_on}, by {' and '.join(reported)}"
             yield Effect(
                 name,
@@ -186,46 +211,39 @@ RIG: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """What acts on the reading and the travel, and what its variable is called in a report."""
 
-Added = tuple[str, tuple[Parameter, ...], Callable[[Values, Values], Any]]
+
+def _of_rig(acts_on: str, name: str, variable: str, reach: float) -> Iterator[FrameVariant]:
+    """Forms of what is added."""
+    for label, own in _added(name, variable):
+        value = partial(_factor, own)
+
+        def at_reading(p: Values, at: Values, value: Any = value) -> Any:
+            return value(p, max_value(min_value(at[variable] / reach, 1), -1))
+
+        coefficients, numbers = own["coefficients"], own.values()
+        yield FrameVariant(
+            label,
+            (*coefficients, *(n for n in numbers if isinstance(n, Parameter))),
+            Shape(X[variable], Y[acts_on], reach, value, own | {"variable": variable}),
+            of=(variable,),
+            added_reading=at_reading if acts_on == "reading" else None,
+            added_travel=at_reading if acts_on == "travel" else None,
+        )
 
 
-def _added(name: str, variable: str, largest: Mapping[str, float]) -> Iterator[Added]:
-    """Forms of what is added: label, parameters, expression."""
-    reach = largest[variable]
-
-    def share(at: Values) -> Any:
-        return max_value(min_value(at[variable] / reach, 1), -1)
-
+def _added(name: str, variable: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Label and numbers of shapes."""
+    one = (Parameter(f"{name}_1", amplitude=True),)
     if variable in ("force_rate", "acceleration"):
-        one = Parameter(f"{name}_1", amplitude=True)
-        yield "linear", (one,), lambda p, at: p[one.name] * at[variable] / reach
+        yield "linear", {"shape": "spline", "coefficients": one}
         return
     if variable == "speed":
-        one = Parameter(f"{name}_1", amplitude=True)
-        yield "sign", (one,), lambda p, at: p[one.name] * tanh(at[variable] / (SLOW * reach))
+        yield "sign", {"shape": "sign", "coefficients": one, "width": SLOW}
         if name.startswith("travel"):
             return
     for label, coefficients, numbers in _shapes(name, len(SPLINES)):
-        shapes = tuple(n for n in numbers.values() if isinstance(n, Parameter))
-
-        def spline(p: Values, at: Values, own: Any = coefficients, numbers: Any = numbers) -> Any:
-            given = {key: _valued(n, p) for key, n in numbers.items()}
-            return shape_of(
-                given["shape"],
-                _valued(own, p),
-                given.get("place"),
-                given.get("width"),
-                share(at),
-            )
-
-        yield label, (*coefficients, *shapes), spline
+        yield label, numbers | {"coefficients": coefficients}
     if variable in ("time", "displacement"):
         waves = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))
-        cycles = Parameter(f"{name}_cycles", CYCLES, 1.0, 2.0 * CYCLES[-1])
-
-        def wave(p: Values, at: Values) -> Any:
-            turn = 2.0 * pi * p[cycles.name] * at[variable] / reach
-            # Nothing at the beginning.
-            return p[waves[0].name] * sin(turn) + p[waves[1].name] * (cos(turn) - 1)
-
-        yield "periodic", (*waves, cycles), wave
+        period = Parameter(f"{name}_period", PERIODS, 0.5 * min(PERIODS), 1.0)
+        yield "periodic", {"shape": "periodic", "coefficients": waves, "width": period}

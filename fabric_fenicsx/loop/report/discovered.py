@@ -1,0 +1,211 @@
+"""Terms that were found without a formula: their shape with its band, and the shortest formula."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from scipy.optimize import curve_fit
+
+from ...mechanics.scalars import derivative_of, numpy_function, symbol
+from ..inference.diagnosis import Diagnosis
+from ..inference.effects import Effect, Shape, Variant
+from .words import parameter_unit
+
+__all__ = ["Discovered", "discovered_report", "discovered_terms"]
+
+Array = npt.NDArray[np.float64]
+
+#: Points of a shape that is shown.
+POINTS = 101
+#: A formula may be off by this many standard errors of the shape, or by this share of its range.
+SIGMAS, SHARE = 2.0, 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Discovered:
+    """A term that was found.
+
+    Attributes:
+        name: discovered_1, ..., the strongest first.
+        effect, variant: the term and its form.
+        values: of all parameters of the model.
+        table: the variable, the shape and its standard error (``std_...``), with units.
+        formula: the shortest one that is near the shape.
+    """
+
+    name: str
+    effect: Effect
+    variant: Variant
+    values: dict[str, float]
+    table: pd.DataFrame
+    formula: str
+
+    @property
+    def shape(self) -> Shape:
+        """Of the form."""
+        assert self.variant.shape is not None
+        return self.variant.shape
+
+
+def discovered_terms(d: Diagnosis, first: int = 1) -> list[Discovered]:
+    """The terms of the reported model that have no name, the strongest first.
+
+    Args:
+        d: what was found.
+        first: number of the first one.
+    """
+    found: list[Discovered] = []
+    for effect in (e for e in d.effects if not e.listed):
+        variant = next(v for v in d.final.variants if v in effect.variants)
+        table = _shape_table(d, variant)
+        about = effect.acts_on.replace("_", " ") + ": "
+        if table.columns[1].startswith("share_of_"):
+            about = table.columns[1].removeprefix("share_of_").replace("_", " ") + " × "
+        name = f"discovered_{first + len(found)}"
+        formula = about + _shortest(table)
+        found.append(Discovered(name, effect, variant, d.final.values, table, formula))
+    return found
+
+
+def _shape_table(d: Diagnosis, variant: Variant) -> pd.DataFrame:
+    """A term's shape over its variable, as far as that was reached."""
+    shape = variant.shape
+    assert shape is not None
+    symbols = {p.name: symbol() for p in variant.parameters} | {"x": symbol()}
+    value = shape.value(symbols, symbols["x"])
+    by = [p.name for p in variant.parameters]
+    evaluate = numpy_function([value, *(derivative_of(value, symbols[n]) for n in by)], symbols)
+    x = np.linspace(0.0, 1.0, POINTS)
+    values, *slopes = evaluate({n: d.final.values[n] for n in by} | {"x": x})
+    full = {n: np.broadcast_to(s, x.shape) for n, s in zip(by, slopes, strict=True)}
+    std = d.final.error_of(full)
+    return pd.DataFrame(
+        {
+            shape.x: shape.reach * x,
+            shape.y: np.broadcast_to(values, x.shape),
+            f"std_{shape.y}": std,
+        }
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Formula:
+    """A formula of x in [0, 1]: value, starts, and its text from the unit's name and numbers."""
+
+    value: Callable[..., Array]
+    starts: tuple[tuple[float, ...], ...]
+    text: Callable[..., str]
+
+
+def _formulas(v: str, unit: str, reach: float) -> Iterator[_Formula]:
+    """Of one number, then of two, then of three, the amplitude first."""
+
+    def at(share: float) -> str:
+        return f"{share * reach:.3g}{' ' + unit if unit else ''}"
+
+    yield _Formula(lambda x, a: a * x, ((1.0,),), lambda a: f"{a:.3g} {v}/{at(1.0)}")
+    yield _Formula(lambda x, a: a * x**2, ((1.0,),), lambda a: f"{a:.3g} ({v}/{at(1.0)})²")
+    yield _Formula(
+        lambda x, a, b: a * (1.0 - np.exp(-x / b)),
+        ((1.0, 0.1), (1.0, 0.5)),
+        lambda a, b: f"{a:.3g} (1 − exp(−{v}/{at(b)}))",
+    )
+    yield _Formula(
+        lambda x, a, b: a * np.log1p(x / b),
+        ((0.3, 0.1),),
+        lambda a, b: f"{a:.3g} ln(1 + {v}/{at(b)})",
+    )
+    yield _Formula(
+        lambda x, a, n: a * x**n,
+        ((1.0, 1.5), (1.0, 3.0)),
+        lambda a, n: f"{a:.3g} ({v}/{at(1.0)})^{n:.3g}",
+    )
+    yield _Formula(
+        lambda x, a, b: a * np.maximum(x - b, 0.0),
+        ((1.0, 0.3), (1.0, 0.6)),
+        lambda a, b: f"{a / reach:.3g} max({v} − {at(b)}, 0)",
+    )
+    yield _Formula(
+        lambda x, a, b, w: a / (1.0 + np.exp(-(x - b) / w)) - a / (1.0 + np.exp(b / w)),
+        ((1.0, 0.3, 0.05), (1.0, 0.6, 0.05)),
+        lambda a, b, w: f"{a:.3g} s(({v} − {at(b)})/{at(w)}), s(y) = 1/(1 + exp(−y))",
+    )
+    yield _Formula(
+        lambda x, a, b, n: a * np.sin(2.0 * np.pi * n * x) + b * (np.cos(2.0 * np.pi * n * x) - 1),
+        tuple((1.0, 0.1, n) for n in np.arange(1.0, 16.0, 0.25)),
+        lambda a, b, n: (
+            f"{np.hypot(a, b):.3g} sin(2π {v}/{at(1.0 / n)} + {np.arctan2(b, a):.2g}) − "
+            f"{np.hypot(a, b) * np.sin(np.arctan2(b, a)):.2g}"
+        ),
+    )
+
+
+def _shortest(table: pd.DataFrame) -> str:
+    """The formula of fewest numbers that is near a shape; that it has none where there is none."""
+    name, own, std = (table[c].to_numpy() for c in table.columns)
+    reach = float(name[-1])
+    unit = parameter_unit(str(table.columns[0]))
+    v = str(table.columns[0])
+    if unit:
+        v = v.removesuffix("_" + unit.replace("/", "_").replace("²", "2"))
+    v = v.replace("_rad", "").replace("_", " ")
+    x = name / reach
+    size = float(np.ptp(own)) or 1.0
+    allowed = np.maximum(SIGMAS * std, SHARE * size)
+    start = float(own[0])
+    best: tuple[int, float, str] | None = None
+    for formula in _formulas(v, unit, reach):
+        for guess in formula.starts:
+            scaled = (guess[0] * (own[-1] - start or size), *guess[1:])
+            try:
+                found, _ = curve_fit(
+                    formula.value, x, own - start, scaled, sigma=allowed, maxfev=500
+                )
+            except (RuntimeError, ValueError, FloatingPointError):
+                continue
+            off = float(np.max(np.abs(formula.value(x, *found) - own + start) / allowed))
+            text = formula.text(*found)
+            if off <= 1.0 and (best is None or (len(found), off) < best[:2]):
+                best = (len(found), off, text)
+    if best is None:
+        return f"f({v}), no short formula"
+    constant = f"{start:.3g} + " if abs(start) > SHARE * size else ""
+    return f"({constant}{best[2]})"
+
+
+def discovered_report(d: Diagnosis, terms: Sequence[Discovered]) -> list[dict[str, Any]]:
+    """Terms as report.json has them."""
+    by_name = {e.name: e for e in (*d.experiment.effects, *d.experiment.terms)}
+
+    def rival(name: str) -> dict[str, Any]:
+        other = by_name[name]
+        if other.listed:
+            return {"name": name}
+        return {"acts_on": other.acts_on, "depends_on": list(other.depends_on)}
+
+    errors = d.final.errors
+    reported = []
+    for term in terms:
+        names = [p.name for p in term.variant.parameters]
+        reported.append(
+            {
+                "name": term.name,
+                "acts_on": term.effect.acts_on,
+                "depends_on": list(term.effect.depends_on),
+                "parameters": {name: term.values[name] for name in names},
+                "std": {n: None if n in d.final.at_bound else errors[n] for n in names},
+                "shape": f"{term.name}.csv",
+                "formula": term.formula,
+                "file": f"{term.name}.py",
+                "rivals": [rival(name) for name in d.rivals.get(term.effect.name, [])],
+                "variant": term.variant.label,
+                "meaning": term.effect.meaning,
+                "of": term.effect.name,
+            }
+        )
+    return reported

@@ -1,0 +1,126 @@
+"""A discovered term as a Python file: an effect that a diagnosis tries and a case takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ... import __version__
+from ...inputs.parameters import Parameter
+from .discovered import Discovered
+
+__all__ = ["effect_file"]
+
+HEAD = '''"""{name}: {about}.
+
+Found by fabric-fenicsx {version} in: {titles}.
+
+    {formula}
+
+Of which nobody knows more than was measured: beyond {reach:.4g} ({x}) it stays what it is there.
+"""
+'''
+
+LAW = '''
+from dataclasses import dataclass
+from typing import Any
+
+import fabric_fenicsx as ff
+
+# Moments per area of fabric [N], angles in rad, times in s.
+FOUND = ff.ShapedLaw(
+{numbers}
+)
+
+
+@dataclass(frozen=True)
+class {class_name}(ff.CrossingLaw):
+    """{about}: {formula}."""
+
+    amount: Any = ff.per_area("amount", "how much there is of it; 1 as it was found", float, 1.0)
+
+    forms = (
+        ff.Form(
+            "{name}",
+            "as found",
+            ({{"amount": ff.Parameter("{name}_amount", amplitude=True)}},),
+            meaning="{about}",
+        ),
+    )
+
+    def moment(self, at: ff.Crossing) -> Any:
+        """What was found, so many times."""
+        return at.number(self.amount) * FOUND.moment(at)
+
+    def history(self, at: ff.Crossing) -> dict[str, Any]:
+        """What was found remembers."""
+        return FOUND.history(at)
+'''
+
+OF_THE_RIG = '''
+from ufl import max_value, min_value
+
+import fabric_fenicsx as ff
+
+AMOUNT = ff.Parameter("{name}_amount", amplitude=True, meaning="1 as it was found")
+REACH = {reach!r}
+SHAPE = {{
+{numbers}
+}}
+
+
+def added(p, at):
+    """What is added: {y}."""
+    x = max_value(min_value(at["{variable}"] / REACH, 1), -1)
+    return p["{name}_amount"] * ff.shape_of(x=x, **SHAPE)
+
+
+EFFECTS = [
+    ff.Effect(
+        "{name}",
+        "{test}",
+        "{about}",
+        (ff.FrameVariant("as found", (AMOUNT,), of=("{variable}",), added_{acts_on}=added),),
+        of_fabric=False,
+    )
+]
+'''
+
+
+def effect_file(term: Discovered, titles: str) -> str:
+    """The text of a term's file.
+
+    Args:
+        term: what was found.
+        titles: of the measurements.
+    """
+    shape = term.shape
+    words = {
+        "name": term.name,
+        "class_name": term.name.title().replace("_", ""),
+        "about": term.effect.meaning,
+        "test": term.effect.test,
+        "version": __version__,
+        "titles": " ".join(titles.split()).replace('"', "'"),
+        "formula": term.formula,
+        "reach": shape.reach,
+        "x": shape.x,
+        "y": shape.y,
+        "acts_on": term.effect.acts_on,
+    }
+    numbers = {name: _valued(n, term.values) for name, n in shape.fixed.items()}
+    if "base" in numbers:
+        if numbers["base"] == "elastic":
+            numbers |= {"k1": term.values["k1_N"], "k3": term.values["k3_N"]}
+        lines = "\n".join(f"    {name}={value!r}," for name, value in numbers.items())
+        return (HEAD + LAW).format(numbers=lines, **words)
+    numbers["kind"], variable = numbers.pop("shape"), numbers.pop("variable")
+    lines = "\n".join(f"    {name!r}: {value!r}," for name, value in numbers.items())
+    return (HEAD + OF_THE_RIG).format(numbers=lines, variable=variable, **words)
+
+
+def _valued(given: Any, values: Mapping[str, float]) -> Any:
+    """A number, or the value of what was fitted."""
+    if isinstance(given, tuple):
+        return tuple(_valued(one, values) for one in given)
+    return values[given.name] if isinstance(given, Parameter) else given
