@@ -178,6 +178,15 @@ class Experiment(Protocol):
         """The material law of a model, where the test has one that a curve shows."""
         ...
 
+    def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
+        """What a term without a formula depends on, at every reading, (n,).
+
+        Args:
+            variant: one of the forms of ``terms``.
+            values: of the parameters of the baseline and of the form.
+        """
+        ...
+
     def predict(
         self,
         variants: Sequence[Variant],

@@ -206,6 +206,7 @@ def discovered_report(d: Diagnosis, terms: Sequence[Discovered]) -> list[dict[st
                 "variant": term.variant.label,
                 "meaning": term.effect.meaning,
                 "of": term.effect.name,
+                "rival_names": list(d.rivals.get(term.effect.name, [])),
             }
         )
     return reported

@@ -43,7 +43,7 @@ def quantity_label(quantity: str) -> str:
 def shown_model(diagnosis: Diagnosis) -> tuple[Fit, str] | None:
     """The model to be shown beside the baseline and what to call it; None: there is none."""
     model = nearest_model(diagnosis)
-    effects = diagnosis.experiment.effects
+    effects = (*diagnosis.experiment.effects, *diagnosis.experiment.terms)
     names = [e.name for v in model.variants for e in effects if v in e.variants]
     if not names:
         return None

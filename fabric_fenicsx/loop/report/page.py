@@ -19,6 +19,7 @@ from ...output.files import write_text
 from ...output.page import inline, number, rendered, save_figure
 from ..inference.diagnosis import Diagnosis
 from .discovered import Discovered
+from .discovered_figures import discovered_figure
 from .drawing import shown_model
 from .effect_file import effect_file
 from .figures import candidates_figure, curve_figure, data_figure, law_figure
@@ -27,6 +28,11 @@ from .residuals import dependence_figure, noise_figure, residual_figure
 from .words import parameter_unit
 
 __all__ = ["Part", "write_report"]
+
+DISCOVERED = (
+    "What the baseline leaves against what the term depends on, and against what its nearest rival "
+    "does; the term's shape; what is left with it."
+)
 
 Part = tuple[Diagnosis, Mapping[str, Any], Sequence[Discovered]]
 
@@ -66,6 +72,7 @@ def _write_page(folder: Path, parts: Sequence[Part]) -> None:
         model = shown_model(diagnosis)
         law = law_table(diagnosis, model[0] if model is not None else diagnosis.baseline)
         figures = _figures(diagnosis, report, law)
+        figures |= {t.name: (discovered_figure(diagnosis, t), DISCOVERED) for t in terms}
         for name, (figure, _) in figures.items():
             save_figure(figure, folder / f"{report['test']}_{name}.png")
         if law is not None:
@@ -164,6 +171,7 @@ def _run_names(report: Mapping[str, Any]) -> list[str]:
 def _candidate_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Candidates, the best criterion first, and what became of each."""
     chosen = {effect["name"]: effect["rivals"] for effect in report["effects"]}
+    chosen |= {term["of"]: term["rival_names"] for term in report["discovered"]}
     before = report["criterion"]["before"]
     rows = []
     for candidate in report["candidates"]:
@@ -209,6 +217,10 @@ def _parameter_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:
     groups += [
         (f"{effect['name']}: {effect['variant']}", list(effect["parameters"]))
         for effect in report["effects"]
+    ]
+    groups += [
+        (f"{term['name']}: {term['variant']}", list(term["parameters"]))
+        for term in report["discovered"]
     ]
     rows = []
     for group, names in groups:

@@ -78,6 +78,8 @@ def _verdict(report: Mapping[str, Any]) -> str:
             if effect["rivals"]:
                 text += f" This data cannot tell {effect['name']} from {one_of(effect['rivals'])}."
         return text
+    if report["verdict"] == "effect_discovered":
+        return _discovered(report, before, after, scatter)
     fitted = error["before"]["fit"]
     if report["curve"] is not None:
         text = (
@@ -108,6 +110,30 @@ def _verdict(report: Mapping[str, Any]) -> str:
         text += f" Nearest came {names}, with {left} left in the fitted runs."
     elif report["candidates"]:
         text += " None comes nearer than the baseline itself, for what it adds."
+    return text
+
+
+def _discovered(report: Mapping[str, Any], before: str, after: str, scatter: str) -> str:
+    terms = report["discovered"]
+    found = [
+        f"something that acts on the {term['acts_on'].replace('_', ' ')} and depends on "
+        f"{_listed([v.replace('_', ' ') for v in term['depends_on']])} ({term['name']})"
+        for term in terms
+    ]
+    names = [effect["name"] for effect in report["effects"]]
+    beside = f", beside {_listed(names)}" if names else ""
+    text = (
+        f"No known effect explains the residual; {_listed(found)} does{beside}: held-out error "
+        f"{before} before, {after} after{_foreseen(report)}; {scatter}."
+    )
+    for term in (term for term in terms if term["rivals"]):
+        others = [
+            r["name"]
+            if "name" in r
+            else f"the {r['acts_on'].replace('_', ' ')} by {_listed(r['depends_on'])}"
+            for r in term["rivals"]
+        ]
+        text += f" This data cannot tell {term['name']} from {one_of(others)}."
     return text
 
 
@@ -173,6 +199,7 @@ def reasons(report: Mapping[str, Any]) -> list[str]:
             "standard errors from nothing, or it predicts stretches that are left out no better."
         ]
     chosen = [effect["name"] for effect in report["effects"]]
+    chosen += [term["of"] for term in report["discovered"]]
     found = []
     for c in (c for c in tried if c["name"] not in chosen):
         smaller = [

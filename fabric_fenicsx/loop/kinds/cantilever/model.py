@@ -244,6 +244,10 @@ class Cantilever:
 
     # Prediction ---------------------------------------------------------------------------
 
+    def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
+        """Nothing: there are no such terms of a cantilever."""
+        raise NotImplementedError(variant.label)
+
     def predict(
         self,
         variants: Sequence[Variant],

@@ -290,6 +290,10 @@ class Drape:
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """None: angles on a sheet are on no curve; see Experiment."""
 
+    def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
+        """Nothing: there are no such terms of a drape."""
+        raise NotImplementedError(variant.label)
+
     def predict(
         self,
         variants: Sequence[Variant],

@@ -11,7 +11,7 @@ classes that the whole net takes; how far tows that bend between crossings leave
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from math import inf, pi, sqrt
@@ -230,6 +230,24 @@ class PictureFrame:
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """None: the moment depends on the angle, its rate and its past; see Experiment."""
 
+    def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
+        """What a term without a formula depends on, at every reading; see Experiment."""
+        assert isinstance(variant, FrameVariant)
+        if variant.laws is None:
+            known = self._force(self._points, (), values)
+            return self._at_readings(self._known(known)[variant.of[0]]().value)
+        key = (variant, "along")
+        if key not in self._compiled:
+            names = tuple(p.name for p in variant.parameters) + variant.of_baseline
+            marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
+            law = variant.laws(marched.at)[0]
+            crossing = _crossing(marched, 0)
+            history = {f"0 {n}": value for n, value in law.history(crossing).items()}
+            variable = law.variable_at(crossing)
+            self._compiled[key] = marched.define({"variable": variable}, history)
+        found = self._compiled[key](self._kinematics(self._points, {}), values)["variable"]
+        return self._at_readings(found.value)
+
     def predict(
         self,
         variants: Sequence[Variant],
@@ -329,7 +347,12 @@ class PictureFrame:
             assert expression is not None
             marched = Marched(variant.of, tuple(p.name for p in variant.parameters))
             self._compiled[key] = marched.define({"added": expression(marched.at, marched.at)}, {})
-        known = {
+        marched, known = self._compiled[key], self._known(force)
+        return marched({name: known[name]() for name in marched.inputs}, values)["added"]
+
+    def _known(self, force: Varying) -> dict[str, Callable[[], Varying]]:
+        """What is known at a reading, by the names of FrameVariant.of, where it is wanted."""
+        return {
             "time": self._since_start,
             "displacement": lambda: self._points["D"],
             "speed": lambda: self._points["D_rate"],
@@ -337,8 +360,6 @@ class PictureFrame:
             "force": lambda: force,
             "force_rate": lambda: self._per_second(force),
         }
-        marched = self._compiled[key]
-        return marched({name: known[name]() for name in marched.inputs}, values)["added"]
 
     def _since_start(self) -> Varying:
         """Time in each run [s]."""
@@ -405,7 +426,7 @@ class PictureFrame:
             names = tuple(p.name for p in parameters)
             names += () if variant is None else variant.of_baseline
             marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
-            at, p = marched.at, marched.at
+            p = marched.at
             if variant is None:
                 laws: tuple[Any, ...] = (
                     PolynomialSpring(k1=p["k1_N"], k3=p["k3_N"]),
@@ -417,14 +438,7 @@ class PictureFrame:
             moment: Any = 0.0
             history: dict[str, Any] = {}
             for k, law in enumerate(laws):
-                crossing = Crossing(
-                    at["gamma"],
-                    at["gamma_n"],
-                    at["per_time"],
-                    lambda value: value,
-                    partial(_remembered, marched, k),
-                    at["rate"],
-                )
+                crossing = _crossing(marched, k)
                 moment = moment + law.moment(crossing)
                 history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
             self._compiled[key] = marched.define({"moment": moment}, history)
@@ -503,6 +517,19 @@ def _typical(rate: Array) -> float:
     """Median of the rates [rad/s] while the frame moves."""
     moving = rate[rate > 1e-6 * float(rate.max())]
     return float(np.median(moving)) if len(moving) else 1.0
+
+
+def _crossing(marched: Marched, number: int) -> Crossing:
+    """What one of several laws may use, in symbols."""
+    at = marched.at
+    return Crossing(
+        at["gamma"],
+        at["gamma_n"],
+        at["per_time"],
+        lambda value: value,
+        partial(_remembered, marched, number),
+        at["rate"],
+    )
 
 
 def _remembered(marched: Marched, number: int, name: str) -> Any:

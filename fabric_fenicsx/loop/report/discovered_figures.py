@@ -1,0 +1,95 @@
+"""What a term was discovered from: residuals against its variable, before and after, its shape."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..inference.diagnosis import Diagnosis
+from ..inference.effects import Variant
+from ..inference.fitting import Fit
+from .discovered import Discovered
+from .drawing import AFTER, FAINT, FITTED, HELD_OUT, MANY, blank, legend, quantity_label
+
+__all__ = ["discovered_figure"]
+
+Array = npt.NDArray[np.float64]
+
+
+def discovered_figure(diagnosis: Diagnosis, term: Discovered) -> Figure:
+    """The residual against the variable found and its nearest rival's, the shape, what remains.
+
+    Args:
+        diagnosis: what was found.
+        term: one of its discovered terms.
+    """
+    d, table = diagnosis, term.table
+    x, y, std = table.columns
+    rival = _nearest_rival(d, term)
+    figure = blank(5.6)
+    panels = figure.subplots(2, 2)
+    along = d.experiment.along(term.variant, d.final.values)
+    _residual(d, panels[0, 0], d.baseline, along, "before, against what it depends on")
+    panels[0, 0].set_xlabel(x)
+    if rival is None:
+        panels[0, 1].set_visible(False)
+    else:
+        name, variant, model = rival
+        assert variant.shape is not None
+        other = d.experiment.along(variant, model.values)
+        _residual(d, panels[0, 1], d.baseline, other, f"before, against that of {name}")
+        panels[0, 1].set_xlabel(variant.shape.x)
+    axes = panels[1, 0]
+    band = 2.0 * table[std]
+    axes.fill_between(table[x], table[y] - band, table[y] + band, color=FAINT)
+    axes.plot(table[x], table[y], color=AFTER)
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.set_title("its shape, ± 2 standard errors", loc="left", fontsize=9)
+    _residual(d, panels[1, 1], d.final, along, "after")
+    panels[1, 1].set_xlabel(x)
+    legend(figure, [panels[0, 0]])
+    return figure
+
+
+def _nearest_rival(d: Diagnosis, term: Discovered) -> tuple[str, Variant, Fit] | None:
+    """The best other term that depends on something else, its form and its fit."""
+    others = [
+        c
+        for c in d.candidates
+        if c.fit is not None
+        and not c.effect.listed
+        and c.effect.depends_on != term.effect.depends_on
+        and np.isfinite(c.criterion)
+    ]
+    if not others:
+        return None
+    best = min(others, key=lambda c: c.criterion)
+    assert best.fit is not None
+    return best.effect.name, best.fit.variants[0], best.fit
+
+
+def _residual(d: Diagnosis, axes: Axes, model: Fit, along: Array, title: str) -> None:
+    readings = d.experiment.readings
+    shown = readings.usable & ~d.outliers
+    band = 2.0 * d.noise
+    axes.axhspan(-band, band, color=FAINT, linewidth=0, label="± 2 noise")
+    for flags, colour, kind in (
+        (shown & ~readings.holdout, FITTED, "fitted"),
+        (shown & readings.holdout, HELD_OUT, "held out"),
+    ):
+        if flags.any():
+            axes.scatter(
+                along[flags],
+                (model.residual * readings.weight)[flags],
+                s=5,
+                color=colour,
+                linewidth=0,
+                label=kind,
+                rasterized=len(along) > MANY,
+            )
+    axes.set_title(title, loc="left", fontsize=9)
+    unit = quantity_label(d.experiment.quantity).partition("[")[2]
+    axes.set_ylabel(f"residual [{unit}")
