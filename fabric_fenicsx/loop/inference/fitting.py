@@ -327,7 +327,7 @@ class _Model:
         """
         for k, p in enumerate(self._parameters):
             away = min(float(x[k]) - p.lower, p.upper - float(x[k]))
-            if active[k] or 0.0 <= away * seen[k] < NEAR_BOUND:
+            if active[k] or (np.isfinite(away) and 0.0 <= away * seen[k] < NEAR_BOUND):
                 yield p.name
 
     def _deviations(self, x: Array) -> dict[str, Array]:

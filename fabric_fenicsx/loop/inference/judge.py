@@ -224,11 +224,16 @@ class Judge:
         """Whether a model leaves noise alone, or so little else that nothing can be made of it."""
         found = self.misfit(model)
         little = model.fit.rms(model.fit.used) < CRITERIA.settled * found.noise
-        # Held-out runs do not say whether to go on: what is looked for would be for their sake.
+        quiet = little or not found.whiteness.structured
+        return bool(quiet) and self.accounts(model, baseline)
+
+    def accounts(self, model: Model, baseline: Model) -> bool:
+        """Whether a model leaves noise in what it was fitted to, whatever holdout runs say.
+
+        They do not say whether to go on: what is looked for would be for their sake.
+        """
         enough = self.held_rows.any() or self.foretells(model)
-        return bool((little or not found.whiteness.structured) and enough) and self.fits(
-            model, baseline
-        )
+        return bool(enough) and self.fits(model, baseline)
 
     def enough(self, model: Model, baseline: Model) -> bool:
         """Whether so little is left beside noise that no further effect can be claimed."""

@@ -65,8 +65,9 @@ def diagnose_test(
         SolveError: the baseline could not be fitted.
     """
     listed = [e for e in experiment.effects if names is None or e.name in names]
-    found = _Search(experiment, listed, progress).run()
-    if found.verdict != "unexplained" or found.curve is not None or names is not None:
+    search = _Search(experiment, listed, progress)
+    found = search.run()
+    if search.accounted or found.curve is not None or names is not None:
         return found
     # Nothing that has a name will do: what acts on what, and by what does it go?
     return _Search(experiment, [*listed, *experiment.terms], progress).run()
@@ -87,6 +88,8 @@ class _Search:
         self._screened_first = any(not effect.listed for effect in effects)
         self.judge = Judge(experiment, self.effects)
         self._forms: dict[frozenset[Effect], list[Fit]] = {}
+        #: Whether the chosen model leaves noise in the fitted readings; holdout runs have no say.
+        self.accounted = False
         self._start = {p.name: p.starts[0] for p in experiment.baseline}
         self.variances = self._first_variances()
         fitted = self._baseline(self._start)
@@ -138,6 +141,7 @@ class _Search:
         baseline = levels[0][0]
         chosen = self._chosen(levels)
         verdict = self._verdict(baseline, chosen)
+        self.accounted = self.judge.accounts(chosen, baseline)
         nearest = _nearest(levels)
         final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
         if final.effects:

@@ -116,7 +116,7 @@ def _verdict(report: Mapping[str, Any]) -> str:
 def _discovered(report: Mapping[str, Any], before: str, after: str, scatter: str) -> str:
     terms = report["discovered"]
     found = [
-        f"something that acts on the {term['acts_on'].replace('_', ' ')} and depends on "
+        f"something that acts on the {term['acts_on'].replace('_', ' ')} and depends on the "
         f"{_listed([v.replace('_', ' ') for v in term['depends_on']])} ({term['name']})"
         for term in terms
     ]
