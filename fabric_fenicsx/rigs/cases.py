@@ -194,6 +194,11 @@ class Case(Keys):
         default_factory=list, description="tows of another section within warp or weft"
     )
     crossover: CrossoverKeys = Field(default_factory=CrossoverKeys, description="the crossings")
+    fabric: str | None = Field(
+        None,
+        description="a fabric.yaml, as a diagnosis writes it: what it has stands in the place of "
+        "`tow`, its weight and `crossover`",
+    )
     mesh: str | None = Field(
         None, description="a .msh with the groups warp, weft and tow_ends, instead of `sheet`"
     )

@@ -64,8 +64,9 @@ class OwnLawKeys(Keys):
 
     law: Literal["own"] = Field(description="A law of your own, see docs/laws.md")
     file: str = Field(
-        description="Python file with one subclass of CrossingLaw, from the case's folder. Is run"
+        description="Python file with a subclass of CrossingLaw, from the case's folder. Is run"
     )
+    name: str | None = Field(None, description="of the class, where the file has several")
     values: dict[str, Any] = Field({}, description="of the keys that the law declares")
 
     @field_validator("file")
@@ -89,10 +90,12 @@ class OwnLawKeys(Keys):
                 moment with them.
         """
         path = Path(self.file)
-        laws = classes_of(run_file(path, "a subclass of CrossingLaw"), CrossingLaw)
+        found = classes_of(run_file(path, "a subclass of CrossingLaw"), CrossingLaw)
+        laws = [law for law in found if self.name in (None, law.__name__)]
         if len(laws) != 1:
-            names = ", ".join(law.__name__ for law in laws) or "none"
-            raise InputError(f"{path}: {names}, allowed is one subclass of CrossingLaw")
+            names = ", ".join(law.__name__ for law in found) or "none"
+            named = "" if self.name is None else f" of the name {self.name}"
+            raise InputError(f"{path}: {names}, allowed is one subclass of CrossingLaw{named}")
         keys, problems = mistakes(_keys(laws[0]), self.values)
         if problems:
             raise InputError(f"values: {problems[0][1]}")

@@ -109,6 +109,14 @@ def number(key: str, meaning: str, allowed: Any = Positive, default: Any = MISSI
     return _declared(Number(key, meaning, allowed, lambda value, _: value, default))
 
 
+def _said(given: Number, value: Any) -> Any:
+    """A case's value of the law's own number, per area: they are multiples of each other."""
+    if isinstance(value, (list, tuple)):
+        return [_said(given, entry) for entry in value]
+    per = given.own(1.0, 1.0)
+    return value if value is None or per == 1.0 else value / per
+
+
 def _declared(given: Number) -> Any:
     """The field of a law's dataclass."""
     default = MISSING if given.default is MISSING else _converted(given, given.default, 1.0)
@@ -243,6 +251,10 @@ class CrossingLaw:
         """
         given = cls.numbers().items()
         return cls(**{n: _converted(one, values[one.key], area) for n, one in given})
+
+    def keys(self) -> dict[str, Any]:
+        """A case's values by key of this law of 1 mm² of fabric: `of_case` backwards."""
+        return {one.key: _said(one, getattr(self, n)) for n, one in self.numbers().items()}
 
 
 def signed(x: Any, size: Any) -> Any:
