@@ -19,6 +19,7 @@ import yaml
 from scipy.linalg import block_diag
 
 from ..errors import InputError
+from ..mechanics.bending_laws import BENDING_LAWS, BendingLaw
 from ..mechanics.laws import LAWS
 from ..mechanics.laws.law import CrossingLaw
 from ..mechanics.laws.tabulated import TabulatedSpring
@@ -43,6 +44,9 @@ BASELINE = {
     "C1_MPa": "tow.C1_MPa",
 }
 """Keys of what every fabric has, by the parameter that is fitted."""
+
+PLACES = {"picture_frame": "crossover.laws", "cantilever": "tow.bending"}
+"""Where the laws of a test go."""
 
 CURVE_POINTS = 13
 """Of a tabulated law: the curves that readings know are smooth."""
@@ -139,10 +143,10 @@ def write_fabric(folder: Path, content: Mapping[str, Any]) -> FabricFile:
 def law_entries(
     variant: Variant, values: Mapping[str, float], folder: Path
 ) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
-    """The laws of a form as entries of a case's list, and what its parameters do to them.
+    """The laws of a form, of a crossing or of bending, as entries of a case's list.
 
     Args:
-        variant: a form with laws of a crossing.
+        variant: a form with laws.
         values: of its parameters.
         folder: from which files count.
 
@@ -157,7 +161,7 @@ def law_entries(
         ends = [laws({**values, p.name: values[p.name] + s * h}) for s in (1.0, -1.0)]
         slopes[p.name] = {}
         for i, (above, below) in enumerate(zip(*ends, strict=True)):
-            inside = f"{i}." if above.law in LAWS else f"{i}.values."
+            inside = f"{i}." if "file" not in entries[i] else f"{i}.values."
             up, down = above.keys(), below.keys()
             for key in up:
                 slope = _slope(up[key], down[key], 2.0 * h)
@@ -172,10 +176,10 @@ def _slope(up: Any, down: Any, h: float) -> Any:
     return 0.0 if up is None else (up - down) / h
 
 
-def _entry(law: CrossingLaw, folder: Path) -> dict[str, Any]:
-    """A law as a case has it, per area."""
+def _entry(law: CrossingLaw | BendingLaw, folder: Path) -> dict[str, Any]:
+    """A law as a case has it, per area or width."""
     keys = {key: value for key, value in law.keys().items() if value is not None}
-    if LAWS.get(law.law) is type(law):
+    if type(law) in (LAWS.get(law.law), BENDING_LAWS.get(law.law)):
         return {"law": law.law, **keys}
     file = Path(str(sys.modules[type(law).__module__].__file__))
     place = os.path.relpath(file.resolve(), folder.resolve())
@@ -265,10 +269,11 @@ def _add_fitted(
             for place, slope in own.items():
                 i, _, key = place.partition(".")
                 if int(i) in place_of:
-                    placed[f"crossover.laws.{place_of[int(i)]}.{key}"] = slope
+                    placed[f"{PLACES[part.test]}.{place_of[int(i)]}.{key}"] = slope
             keys[name], of[name] = placed, (effect.name, variant.label)
-    if part.crossover:
-        part.crossover["laws"] = laws
+    group, _, key = PLACES.get(part.test, "").partition(".")
+    if key:
+        getattr(part, group)[key] = laws
     part.parameters = [
         {
             "name": name,

@@ -20,7 +20,7 @@ from ..inputs.groups import Keys, NotNegative, Positive
 from ..inputs.validation import mistakes, one_line, read_keys
 from .cases import Case
 from .common import KG_M2, section
-from .shear_law_keys import ShearLawKeys
+from .shear_law_keys import BendingLawKeys, ShearLawKeys
 
 __all__ = [
     "FILE",
@@ -58,6 +58,7 @@ class FoundTowKeys(Keys):
     height_mm: Positive = Field(description="of the section across the sheet")
     C1_MPa: Positive = Field(description="Neo-Hookean constant; E = 6 C1")
     bending_in_plane_Nmm: Positive | None = Field(None, description="as tow.stiffness of a case")
+    bending: list[BendingLawKeys] = Field(default_factory=list, description="as in a case")
 
 
 class FoundCrossoverKeys(Keys):
