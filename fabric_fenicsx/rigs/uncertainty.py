@@ -14,6 +14,7 @@ smaller than either, f′ A = (f′ W)(W⁺ A) does not magnify the errors of th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -173,7 +174,14 @@ def _seen(case: Case, result: Mapping[str, Any], folder: Path) -> _Seen:
     if compared is not None:
         rows = pd.read_csv(folder / compared.file)
         table = {name: rows[name].to_numpy(dtype=float) for name in rows}
-    return _Seen(dict(_flat(result)), table)
+    numbers = dict(_flat(result))
+    if isinstance(case, DrapeCase):
+        from .report import wrinkles
+
+        # A mesh of one's own need not be a woven sheet.
+        with suppress(InputError):
+            numbers |= {f"wrinkles.{name}": value for name, value in wrinkles(folder).items()}
+    return _Seen(numbers, table)
 
 
 def _slope(
