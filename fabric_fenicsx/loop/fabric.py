@@ -24,7 +24,7 @@ from ..mechanics.laws import LAWS
 from ..mechanics.laws.law import CrossingLaw
 from ..mechanics.laws.tabulated import TabulatedSpring
 from ..output.files import write_text
-from ..rigs.fabric_file import FILE, SCHEMA, FabricFile, read_fabric
+from ..rigs.fabric_file import FILE, SCHEMA
 from .inference.curve import Curve
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect, Variant
@@ -85,6 +85,10 @@ def fabric_content(
         folder: from which the files of laws count.
     """
     parts = [_part(d, folder) for d, _ in tests]
+    for k, part in enumerate(parts):
+        if part.crossover and any(earlier.crossover for earlier in parts[:k]):
+            # Crossings are those of the first test that has them.
+            parts[k] = _Part(part.test, others=part.others, known=part.known)
     every = [m for _, measurements in tests for m in measurements]
     found = [m for d, of in tests for m in of if d.experiment.test == "cantilever"]
     # A stiffness belongs to the section that it was found with.
@@ -124,8 +128,8 @@ def fabric_content(
     return _rounded(content)
 
 
-def write_fabric(folder: Path, content: Mapping[str, Any]) -> FabricFile:
-    """Write fabric.yaml and read it again, as a case would.
+def write_fabric(folder: Path, content: Mapping[str, Any]) -> None:
+    """Write fabric.yaml.
 
     Raises:
         InputError: it cannot be written.
@@ -137,7 +141,6 @@ def write_fabric(folder: Path, content: Mapping[str, Any]) -> FabricFile:
         write_text(folder / FILE, HEAD + text)
     except OSError as error:
         raise InputError(f"{folder}: {FILE} cannot be written ({error.strerror})") from error
-    return read_fabric(folder / FILE)
 
 
 def law_entries(

@@ -251,15 +251,19 @@ def taken(fabric: FabricFile) -> dict[str, Any]:
     for p in fabric.parameters:
         for key in p.keys:
             sources.setdefault(key, []).append(p)
+            # Numbers of a law that are not fitted are its form's.
+            sources.setdefault(key.rpartition(".")[0], []).append(p)
     rows = []
     for key, value in _numbers(fabric):
+        law = ".laws." in key or ".bending." in key
         own = sources.get(key, [])
+        of = own or (sources.get(key.rpartition(".")[0], []) if law else [])
         rows.append(
             {
                 "key": key,
                 "value": value,
                 "std": _std(own, key),
-                "source": "; ".join(dict.fromkeys(_source(p) for p in own)) or "stated",
+                "source": "; ".join(dict.fromkeys(_source(p) for p in of)) or "stated",
             }
         )
     groups = {"tow": fabric.tow, "crossover": fabric.crossover}
@@ -284,9 +288,9 @@ def _std(own: list[ParameterKeys], key: str) -> float | None:
 
 
 def _numbers(fabric: FabricFile) -> Iterator[tuple[str, Any]]:
-    """What replaces a case's own, by dotted keys of the file."""
+    """What replaces a case's own, by dotted keys of the file; names of laws and files are none."""
     data = fabric.model_dump(include={"fabric", "tow", "crossover"}, exclude_none=True)
-    yield from _leaves(data, "")
+    yield from ((key, value) for key, value in _leaves(data, "") if not isinstance(value, str))
 
 
 def _leaves(group: Any, place: str) -> Iterator[tuple[str, Any]]:

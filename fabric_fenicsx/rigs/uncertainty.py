@@ -44,6 +44,8 @@ Runner = Callable[[Case, Path, Callable[[float, int, int], None]], dict[str, Any
 STEPS = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.1, -0.1)
 #: Share of the largest eigenvalue that is round-off.
 ROUNDING = 1e-9
+#: Figures of a run's health that say how it was solved.
+OF_THE_SOLVER = ("failed_attempts", "wasted_iterations_share", "energy_won_share")
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,9 +213,9 @@ def _slope(
 
 def _flat(result: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     """Numbers of a result by dotted names: its quantities, and those of its health."""
-    for group in ("quantities", "health"):
-        for name, value in _leaves(result.get(group, {}), ""):
-            yield (name if group == "quantities" else f"health.{name}"), value
+    yield from _leaves(result.get("quantities", {}), "")
+    health = {k: v for k, v in result.get("health", {}).items() if k not in OF_THE_SOLVER}
+    yield from _leaves(health, "health")
 
 
 def _leaves(group: Any, place: str) -> Iterator[tuple[str, float]]:
