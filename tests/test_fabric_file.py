@@ -294,7 +294,7 @@ def test_uncertainty_of_a_linear_frame(tmp_path):
         written(folder, content)
     MPI.COMM_WORLD.barrier()
     more = {"hold_s": 0.0, "unload": False, "fabric_length_mm": 48.0}
-    case = make_case("picture_frame", **{k: v for k, v in FRAME.items() if k != "tow"}, **more)
+    case = make_case("picture_frame", **{**FRAME, **more})
     told = []
     result = run(
         case,
