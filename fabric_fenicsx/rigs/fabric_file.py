@@ -19,7 +19,6 @@ from ..errors import InputError
 from ..inputs.groups import Keys, NotNegative, Positive
 from ..inputs.validation import mistakes, one_line, read_keys
 from .cases import Case
-from .common import KG_M2, section
 from .shear_law_keys import BendingLawKeys, ShearLawKeys
 
 __all__ = [
@@ -221,6 +220,8 @@ def with_fabric(case: Case, fabric: FabricFile) -> Case:
 
 def areal_density(case: Case) -> float:
     """Mass per area of a case's warp and weft [kg/m²]."""
+    from .common import KG_M2, section
+
     spacings = case.spacings  # type: ignore[attr-defined]
     return float(KG_M2 * sum(section(case.tow, s).mass()[0] / s for s in spacings))
 
