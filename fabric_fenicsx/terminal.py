@@ -230,7 +230,9 @@ def summarise(result: dict[str, Any], folder: Any) -> None:
 
 def _show_fabric(console: Console, fabric: dict[str, Any]) -> None:
     """Which numbers are not the case's own, and what their file does not say."""
-    table = Table("of the fabric's file", "value", "±", "from", title_justify="left")
+    table = Table()
+    for heading in ("from the fabric's file", "value", "±", "found in"):
+        table.add_column(heading, overflow="fold")
     for row in fabric["taken"]:
         value = f"{len(row['value'])} values" if isinstance(row["value"], list) else row["value"]
         table.add_row(row["key"], _shown(value), _shown(row["std"]), row["source"])

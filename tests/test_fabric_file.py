@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from test_rigs import SMALL
 from test_shear_laws import moments
 
 from fabric_fenicsx.__main__ import main
@@ -325,6 +326,41 @@ def test_uncertainty_of_a_linear_frame(tmp_path):
     assert rows["tow.C1_MPa"]["source"] == "stated"
     again = yaml.safe_load((folder / "out" / "case.yaml").read_text())
     assert again["fabric"] is None and again["crossover"]["k3_N_mm"] == 0.06
+
+
+def test_a_drape_says_how_uncertain_it_is(tmp_path, capsys):
+    """One spring with an error: each angle's is its change in a case that has the other spring."""
+    keys = {"crossover.k1_N_mm": 1.0}
+    content = fabric(
+        parameters=[parameter("k1_N", 0.02, **keys) | {"value": 0.03}], correlations=[[1.0]]
+    )
+    file = written(tmp_path, content)
+    path, out = tmp_path / "small.yaml", tmp_path / "out"
+    path.write_text(json.dumps({**SMALL, "points": [{"x_mm": 30, "y_mm": 30}]}))
+    arguments = ["run", str(path), "--out", str(out), "--no-pictures"]
+    with pytest.raises(SystemExit) as end:
+        main([*arguments, "--fabric", str(file), "--uncertainty"])
+    said = capsys.readouterr()
+    assert not end.value.code
+    assert "1 further runs, 2 times the time of one, for k1_N" in said.err
+    assert "picture_frame: baseline" in said.out and "largest shear angle" in said.out
+    assert "(fit) ± 0 (specimens)" in said.out
+    table = pd.read_csv(out / "uncertainty.csv")
+    angles = []
+    for k1 in (0.03, 0.05):
+        case = with_fabric(load_case(path), read_fabric(file))
+        crossover = case.crossover.model_copy(update={"k1_N_mm": k1})
+        place = tmp_path / f"{k1}"
+        run(case.model_copy(update={"crossover": crossover}), place, pictures=False)
+        angles.append(pd.read_csv(place / "crossings.csv")["angle_deg"].to_numpy())
+    change = np.abs(angles[1] - angles[0])
+    assert change.max() > 0.01
+    assert table["angle_deg_fit"].to_numpy() == pytest.approx(change, abs=1e-4)
+    found = json.loads((out / "result.json").read_text())["uncertainty"]
+    every = next(row for row in found["regions"] if row["region"] == "all")
+    assert every["fit_deg"] == pytest.approx(np.sqrt(np.mean(change**2)), abs=1e-4)
+    assert {"punch_force_N", "points.0.angle_deg"} <= set(found["quantities"])
+    assert any(name.startswith("wrinkles.") for name in found["quantities"])
 
 
 # Round --------------------------------------------------------------------------------------------

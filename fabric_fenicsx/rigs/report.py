@@ -126,9 +126,10 @@ def wrinkles(folder: Path) -> dict[str, float]:
     """
     found = content(analysed(_read(folder, None, None), Settings()))["wrinkles"]
     waves = (found["out_of_plane"] or {}).get("largest", [])
+    bent = found["curvature"]["percentile_90_beyond_tool_1_m"]
     numbers = {
         "wave_amplitude_mm": waves[0]["amplitude_mm"] if waves else 0.0,
-        "curvature_beyond_tool_1_m": found["curvature"]["percentile_90_beyond_tool_1_m"],
+        "curvature_beyond_tool_1_mm": None if bent is None else 1e-3 * bent,
         "in_plane_amplitude_mm": (found["in_plane"] or {}).get("percentile_90_mm"),
         "over_buckling_load": (found["compression"] or {}).get("largest_over_buckling_load"),
     }

@@ -44,8 +44,16 @@ Runner = Callable[[Case, Path, Callable[[float, int, int], None]], dict[str, Any
 STEPS = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.1, -0.1)
 #: Share of the largest eigenvalue that is round-off.
 ROUNDING = 1e-9
-#: Figures of a run's health that say how it was solved.
-OF_THE_SOLVER = ("failed_attempts", "wasted_iterations_share", "energy_won_share")
+#: Numbers that say how a run was solved, or where something is.
+NOT_COMPARED = {
+    "failed_attempts",
+    "wasted_iterations_share",
+    "energy_won_share",
+    "kinetic_over_stored_energy",
+    "at_s",
+    "x0_mm",
+    "y0_mm",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,9 +221,10 @@ def _slope(
 
 def _flat(result: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     """Numbers of a result by dotted names: its quantities, and those of its health."""
-    yield from _leaves(result.get("quantities", {}), "")
-    health = {k: v for k, v in result.get("health", {}).items() if k not in OF_THE_SOLVER}
-    yield from _leaves(health, "health")
+    for group in ("quantities", "health"):
+        for name, value in _leaves(result.get(group, {}), "" if group == "quantities" else group):
+            if name.rpartition(".")[2] not in NOT_COMPARED:
+                yield name, value
 
 
 def _leaves(group: Any, place: str) -> Iterator[tuple[str, float]]:
