@@ -166,6 +166,7 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
             table.add_row(label, *row, _shown(error["noise"]))
         console.print(table)
     console.print(f"report in {folder / 'report.html'}", soft_wrap=True)
+    console.print(f"for run CASE.yaml --fabric: {folder / 'fabric.yaml'}", soft_wrap=True)
 
 
 def summarise_convergence(study: dict[str, Any], folder: Any) -> None:
@@ -214,11 +215,55 @@ def summarise(result: dict[str, Any], folder: Any) -> None:
         f"{seconds:.1f} s; results in {folder}",
         soft_wrap=True,
     )
+    if "fabric" in result:
+        _show_fabric(console, result["fabric"])
     show_quantities(console, result.get("quantities", {}))
+    if "uncertainty" in result:
+        _show_uncertainty(console, result["uncertainty"])
     error = result.get("discretisation_error")
     if error is not None:
         console.print(
             f"error of the {error['of']}: about {error['estimate_deg']:.2g}°, by {error['source']}",
+            soft_wrap=True,
+        )
+
+
+def _show_fabric(console: Console, fabric: dict[str, Any]) -> None:
+    """Which numbers are not the case's own, and what their file does not say."""
+    table = Table()
+    for heading in ("from the fabric's file", "value", "±", "found in"):
+        table.add_column(heading, overflow="fold")
+    for row in fabric["taken"]:
+        value = f"{len(row['value'])} values" if isinstance(row["value"], list) else row["value"]
+        table.add_row(row["key"], _shown(value), _shown(row["std"]), row["source"])
+    console.print(table)
+    for test in fabric["tests"]:
+        if test["known"]:
+            console.print(f"{test['test']}: {test['known']}", soft_wrap=True)
+    for name, words in (
+        ("of_the_case", "not in the file, as in the case"),
+        ("not_of_the_fabric", "not of the fabric, left out"),
+        ("without_a_key", "of the fabric, but no case has it"),
+    ):
+        if fabric[name]:
+            console.print(f"{words}: {', '.join(fabric[name])}", soft_wrap=True)
+
+
+def _show_uncertainty(console: Console, found: dict[str, Any]) -> None:
+    """Quantities with what the fit and the specimens leave open; of the health in the file only."""
+    for name, row in found["quantities"].items():
+        if name.startswith("health.") or name.rpartition(".")[2] in UNSHOWN:
+            continue
+        words = name.removesuffix(_ending(name)).replace("_", " ").replace(".", " ")
+        console.print(
+            f"{words} {_shown(row['value'])} ± {row['fit']:.2g} {unit(name)} (fit) "
+            f"± {row['specimens']:.2g} (specimens)",
+            soft_wrap=True,
+        )
+    for row in found.get("regions", []):
+        console.print(
+            f"angles, {row['region']}: ± {row['fit_deg']:.2g}° (fit) "
+            f"± {row['specimens_deg']:.2g}° (specimens), rms",
             soft_wrap=True,
         )
 

@@ -36,7 +36,8 @@ def diagnose(
 ) -> None:
     """Fit the model to measurements and name the effects that it lacks.
 
-    Several folders are tests of one fabric. Writes report.json, report.html and its figures. Exit
+    Several folders are tests of one fabric. Writes report.json, report.html and its figures, and
+    fabric.yaml, which `run CASE.yaml --fabric` takes. Exit
     code 2: bad input, nothing has been written. 3: the baseline model could not be fitted.
     """
     wanted = None if effects is None else [name.strip() for name in effects.split(",")]

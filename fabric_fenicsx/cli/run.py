@@ -23,6 +23,22 @@ def run(
         typer.Option("--out", metavar="DIR", help="Results; default: results/ and the case's name"),
     ] = None,
     settings: Settings = None,
+    fabric: Annotated[
+        Path | None,
+        typer.Option(
+            "--fabric",
+            metavar="FILE",
+            help="A fabric.yaml, as diagnose writes it, in the place of the case's own fabric.",
+        ),
+    ] = None,
+    uncertainty: Annotated[
+        bool,
+        typer.Option(
+            "--uncertainty",
+            help="How uncertain the results are as that fabric is: one more run for each of its "
+            "uncertain numbers.",
+        ),
+    ] = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the last accepted step in DIR.")
     ] = False,
@@ -39,8 +55,15 @@ def run(
     started = perf_counter()
     folder = out if out is not None else Path("results") / case.stem
 
+    options = {
+        "uncertainty": uncertainty,
+        "resume": resume,
+        "pictures": not no_pictures,
+        "started": started,
+    }
+
     def action(comm: Any) -> int:
-        return _run(comm, case, folder, settings or [], resume, quiet, not no_pictures, started)
+        return _run(comm, case, folder, settings or [], fabric, quiet, **options)
 
     raise typer.Exit(collective(action, folder))
 
@@ -50,29 +73,28 @@ def _run(
     path: Path,
     folder: Path,
     settings: list[str],
-    resume: bool,
+    fabric: Path | None,
     quiet: bool,
-    pictures: bool,
-    started: float,
+    **options: Any,
 ) -> int:
     from ..rigs.load import load_case
 
-    case = from_root(comm, lambda: load_case(path, settings))
+    case = from_root(comm, lambda: load_case(path, settings, fabric=fabric))
 
     from ..rigs.run import run
     from ..terminal import following, summarise
 
     root = comm.rank == 0
+    if options["uncertainty"] and not quiet:
+        say(from_root(comm, lambda: _cost(case, path.parent)))
     with following(quiet=quiet or not root) as progress:
         result = run(
             case,
             folder,
             base=path.parent,
-            resume=resume,
-            pictures=pictures,
             progress=progress,
-            started=started,
             comm=comm,
+            **options,
         )
     if root:
         if not quiet:
@@ -82,4 +104,21 @@ def _run(
         if not result["completed"]:
             reason = str(result["stopped_because"]).removeprefix("stopped ")
             say(f"stopped: {reason}; accepted steps are in {folder}")
+        for sentence in result.get("uncertainty", {}).get("left_out", []):
+            say(f"warning: not in the uncertainty: {sentence}")
     return 0 if result["completed"] else SolveError.exit_code
+
+
+def _cost(case: Any, base: Path) -> str:
+    """What the uncertainty will take."""
+    from ..rigs.fabric_file import resolved
+    from ..rigs.uncertainty import uncertain
+
+    fabric = resolved(case, base)[1]
+    names = [] if fabric is None else uncertain(fabric)
+    if not names:
+        return "uncertainty: no number of a fabric file has one"
+    return (
+        f"uncertainty: {len(names)} further runs, {1 + len(names)} times the time of one, for "
+        f"{', '.join(names)}"
+    )

@@ -27,6 +27,8 @@ UNITS = {
     "1_rad": "1/rad",
     "rad_s": "rad/s",
     "N_s_mm": "N s/mm",
+    "N_mm3": "N mm³",
+    "1_mm": "1/mm",
     "N_mm2": "N/mm²",
     "mm_s2": "mm/s²",
     "mm_min": "mm/min",

@@ -115,7 +115,7 @@ def read_keys(
             close = suggestion(value, allowed_here) if isinstance(value, str) else ""
             shown = f"{plain(value)}{close}" if key in data else "missing"
             raise InputError(one_line(f"{path}: {key}: {shown}, allowed is {one_of(allowed_here)}"))
-    keys, found = mistakes(models[data[tag]], data)
+    keys, found = mistakes(models[data[tag]], data, path.parent)
     if found:
         more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
         raise InputError(one_line(f"{path}: {found[0][1]}{more}"))

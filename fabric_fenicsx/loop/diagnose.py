@@ -13,6 +13,7 @@ from mpi4py import MPI
 from ..errors import FitError, InputError, SolveError
 from ..inputs.keys import one_of
 from ..output.folder import prepare_folder
+from .fabric import fabric_content, write_fabric
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect
 from .inference.experiment import Experiment
@@ -41,10 +42,12 @@ class Found:
     Attributes:
         report: the content of report.json.
         diagnoses: of each test, in the order of the kinds.
+        fabric: the content of fabric.yaml.
     """
 
     report: dict[str, Any]
     diagnoses: tuple[Diagnosis, ...]
+    fabric: dict[str, Any]
 
 
 def read_measurement(folder: Path | str) -> Measurement:
@@ -82,7 +85,7 @@ def diagnose(
 
     Args:
         measurements: of any kinds.
-        out: folder for report.json, report.html and its figures; None writes nothing.
+        out: folder for report.json, report.html, its figures and fabric.yaml; None writes nothing.
         effects: names of those to try; by default all that are known.
         effects_from: a Python file with effects of the user's own.
         models: by test, to be taken instead of that kind's own; see Kind.experiment.
@@ -128,10 +131,13 @@ def diagnose(
         terms = discovered_terms(diagnosis, 1 + sum(len(found) for _, _, found in parts))
         parts.append((diagnosis, test_report(diagnosis, same, advice, terms), terms))
     report = combined_report([content for _, content, _ in parts])
+    found = [(d, same) for (d, _, _), (_, same, _) in zip(parts, tests, strict=True)]
+    fabric = fabric_content(found, folder or Path())
     if folder is not None:
         progress(1.0, "drawing")
+        write_fabric(folder, fabric)
         write_report(folder, parts, report)
-    return Found(report, tuple(diagnosis for diagnosis, _, _ in parts))
+    return Found(report, tuple(diagnosis for diagnosis, _, _ in parts), fabric)
 
 
 def _experiments(

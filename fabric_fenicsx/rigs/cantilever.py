@@ -19,7 +19,7 @@ from ..fabric.paths import TowPaths
 from ..fabric.sheet import Sheet
 from ..inputs.groups import Positive
 from .cases import PlainWeaveCase
-from .rig import Rig
+from .rig import Compared, Rig
 
 if TYPE_CHECKING:
     from ..solving.model import Model
@@ -187,4 +187,5 @@ RIG = Rig(
     run=run,
     steps=lambda case: float(case.load_steps),
     iterations=2.5,
+    compared=Compared("shape.csv", ("x_mm", "z_mm")),
 )

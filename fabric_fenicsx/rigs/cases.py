@@ -16,7 +16,7 @@ from ..fabric.sheet import Sheet, spaced_sheet
 from ..inputs.groups import Keys, NotNegative, Positive
 from ..mechanics.laws.dashpots import LinearDashpot
 from ..mechanics.laws.springs import PolynomialSpring
-from .shear_law_keys import ShearLawKeys
+from .shear_law_keys import BendingLawKeys, ShearLawKeys
 
 __all__ = [
     "Assumptions",
@@ -83,6 +83,11 @@ class TowKeys(Keys):
     )
     stiffness: StiffnessKeys | None = Field(
         None, description="in place of what follows from the section"
+    )
+    bending: list[BendingLawKeys] = Field(
+        default_factory=list,
+        description="moments per width beside that of the section, which is the stiffness left "
+        "where fibres slip; any of these as often as there are causes",
     )
     bundle: BundleKeys | None = Field(None, description="only with section_law: bundle")
     shear_correction: Positive = Field(5.0 / 6.0, description="factor on the shear stiffness")
@@ -194,6 +199,11 @@ class Case(Keys):
         default_factory=list, description="tows of another section within warp or weft"
     )
     crossover: CrossoverKeys = Field(default_factory=CrossoverKeys, description="the crossings")
+    fabric: str | None = Field(
+        None,
+        description="a fabric.yaml, as a diagnosis writes it: what it has stands in the place of "
+        "`tow`, its weight and `crossover`",
+    )
     mesh: str | None = Field(
         None, description="a .msh with the groups warp, weft and tow_ends, instead of `sheet`"
     )

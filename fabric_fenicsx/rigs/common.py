@@ -26,6 +26,7 @@ from ..output.files import write_text
 from ..parallel import from_root
 from ..solving.model import Model
 from ..solving.parts import CrossoverLaw
+from ..solving.sections import Bending
 from ..solving.snapshot import Snapshot
 from ..solving.stepping import StepControl
 from .cases import BundleKeys, Case, CrossoverKeys, SolverKeys, StiffnessKeys, TowKeys
@@ -186,10 +187,13 @@ def fabric_model(
         rig: what the rig adds; further arguments of Model.
     """
     sections, kind = tow_sections(case, net, spacings)
+    families = [WARP, WEFT, *(WARP if t.family == "warp" else WEFT for t in case.tow_types)]
+    laws = tuple(keys.build() for keys in case.tow.bending)
     return Model(
         net,
         sections,
         tow_section=kind,
+        bending=Bending(laws, tuple(spacings[family] for family in families)),
         section_law="linear" if case.tow.section_law == "bundle" else case.tow.section_law,
         crossovers=crossover_law(case.crossover, spacings[0] * spacings[1], session.laws),
         comm=session.comm,

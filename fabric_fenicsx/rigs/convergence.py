@@ -12,6 +12,7 @@ import json
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -32,15 +33,17 @@ from ..output.folder import prepare_folder
 from ..output.record import write_result
 from ..output.results import read_results
 from ..parallel import from_root
+from ..solving.snapshot import Snapshot
 from .cases import Case
 from .discretisation_error import recovered_error, studied_error
 from .drape import DrapeCase, mirrors
+from .fabric_file import resolved
 from .levels import FAMILIES, Family, Level, families
 from .richardson import Estimate, estimate_error
 from .run import run
 from .write_case import case_text
 
-__all__ = ["REGIONS", "SCHEMA", "converge"]
+__all__ = ["REGIONS", "SCHEMA", "converge", "region_of"]
 
 SCHEMA = "fabric-convergence/1"
 
@@ -109,6 +112,8 @@ def converge(
         InputError: no drape, no such families of this case, or the folder holds another's runs.
     """
     folder = Path(folder)
+    case, _ = from_root(comm, partial(resolved, case, base))
+    case = case.model_copy(update={"fabric": None})
     if not isinstance(case, DrapeCase):
         raise InputError(f"test: {case.test}, allowed is drape")
     wanted = families(case, only)
@@ -161,16 +166,31 @@ def _run(
     return result
 
 
-def _outcome(case: DrapeCase, folder: Path, result: dict[str, Any]) -> Outcome:
+def region_of(folder: Path) -> npt.NDArray[np.str_]:
+    """Where each crossing of a drape's last step is, one of REGIONS beside "all", (n,)."""
+    return _regions(*_last(folder))
+
+
+def _last(folder: Path) -> tuple[Net, Snapshot, list[Any]]:
+    """Net, last step and tools of a run."""
     results = read_results(folder)
-    net, snapshot, tools = results.at(results.nearest(None))
-    flat = net.points[net.crossings].mean(axis=1)
-    place = flat + snapshot.displacement[net.crossings].mean(axis=1)
+    return results.at(results.nearest(None))
+
+
+def _regions(net: Net, snapshot: Snapshot, tools: Sequence[Any]) -> npt.NDArray[np.str_]:
+    place = net.points[net.crossings].mean(axis=1)
+    place = place + snapshot.displacement[net.crossings].mean(axis=1)
     tools = [tool for tool in tools if tool.name != "holder"]
     which, on_tool, _ = nearest_tool(tools, place)
     punch = np.array([tool.name == "punch" for tool in tools])[which]
     # The die's face lies in z = 0.
     on_die = np.where(on_tool[:, 2] > -1e-3, "flange", "edge")
+    return np.where(punch, "dome", on_die)
+
+
+def _outcome(case: DrapeCase, folder: Path, result: dict[str, Any]) -> Outcome:
+    net, snapshot, tools = _last(folder)
+    flat = net.points[net.crossings].mean(axis=1)
     shear = np.degrees(axes_shear(snapshot.axes))
     numbers = {"punch_force_N": result["quantities"]["punch_force_N"]}
     if case.points:
@@ -182,7 +202,7 @@ def _outcome(case: DrapeCase, folder: Path, result: dict[str, Any]) -> Outcome:
         net,
         flat[:, :2],
         shear,
-        np.where(punch, "dome", on_die),
+        _regions(net, snapshot, tools),
         numbers,
         recovered_error(net, snapshot, mirrors(case))["estimate_deg"],
     )

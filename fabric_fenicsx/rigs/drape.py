@@ -22,7 +22,7 @@ from ..fabric.paths import TowPaths
 from ..fabric.sheet import Sheet, centred_sheet
 from ..inputs.groups import Keys, NotNegative, Positive
 from .cases import Case
-from .rig import Rig
+from .rig import Compared, Rig
 from .weave_keys import SheetKeys, WeaveKeys, crossing_weights, layout
 
 if TYPE_CHECKING:
@@ -371,4 +371,5 @@ RIG = Rig(
     quarter=lambda case: case.symmetry == "quarter",
     steps=lambda case: 1.25 * case.duration_s / case.solver.largest_step_s,
     iterations=4.0,
+    compared=Compared("crossings.csv", ("angle_deg", "shear_deg")),
 )

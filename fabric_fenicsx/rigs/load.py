@@ -18,6 +18,7 @@ from ..inputs.validation import (
     suggestion,
 )
 from .cases import Case
+from .fabric_file import resolved
 from .registry import RIGS, rig
 from .rig import Rig
 
@@ -26,15 +27,18 @@ __all__ = ["load_case"]
 OPTION = "--set"
 
 
-def load_case(path: Path | str, settings: Sequence[str] = ()) -> Case:
+def load_case(
+    path: Path | str, settings: Sequence[str] = (), *, fabric: Path | None = None
+) -> Case:
     """Read a case file and check it.
 
     Args:
         path: the YAML file.
         settings: ``dotted.key=value`` put over the file's values; a value is read as YAML.
+        fabric: a fabric.yaml, in the place of the one that the case names, if it names one.
 
     Returns:
-        The case.
+        The case, with its fabric's numbers in the place of its own.
 
     Raises:
         InputError: one line that names the file (or ``--set``), the key and what is allowed.
@@ -45,6 +49,8 @@ def load_case(path: Path | str, settings: Sequence[str] = ()) -> Case:
         what = "empty" if data is None else plain(data)
         raise InputError(f"{path}: {what}, allowed is a mapping of keys with test: {_tests()}")
     changed = [_apply(data, setting) for setting in settings]
+    if fabric is not None:
+        data["fabric"] = str(fabric.resolve())
     test = data.get("test")
     if not isinstance(test, str) or test not in RIGS:
         close = suggestion(test, RIGS) if isinstance(test, str) else ""
@@ -62,7 +68,23 @@ def load_case(path: Path | str, settings: Sequence[str] = ()) -> Case:
         )
         more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
         raise InputError(one_line(f"{OPTION if set_here else path}: {text}{more}"))
-    return cast(Case, case)
+    whole, _ = resolved(cast(Case, case), path.parent)
+    for place in changed:
+        if _at(whole, place) != _at(case, place):
+            dotted = dotted_place(place)
+            raise InputError(f"{OPTION}: {dotted}: the fabric's own, allowed is one of the two")
+    return whole
+
+
+def _at(case: Case, place: Place) -> Any:
+    """What stands at a place of a case; nothing where a list has become shorter."""
+    value: Any = case
+    for part in place:
+        if isinstance(part, int):
+            value = value[part] if part < len(value) else None
+        else:
+            value = value.get(part) if isinstance(value, dict) else getattr(value, part, None)
+    return value
 
 
 def _apply(data: dict[Any, Any], setting: str) -> Place:

@@ -21,7 +21,7 @@ from ..fabric.paths import TowPaths
 from ..fabric.sheet import Sheet
 from ..inputs.groups import NotNegative, Positive
 from .cases import PlainWeaveCase
-from .rig import Rig
+from .rig import Compared, Rig
 
 if TYPE_CHECKING:
     from ..solving.model import Model, Support
@@ -239,4 +239,5 @@ RIG = Rig(
     run=run,
     steps=lambda case: 1.1 * duration(case) / case.solver.largest_step_s,
     iterations=1.4,
+    compared=Compared("curve.csv", ("force_N", "normalised_force_N_mm"), along="time_s"),
 )

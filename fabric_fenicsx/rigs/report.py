@@ -20,13 +20,14 @@ from ..output.draped import draped_sheet
 from ..output.mirror import whole_sheet
 from ..output.pattern import circle
 from ..output.report.analysis import Drape, Settings, analysed
+from ..output.report.content import content
 from ..output.report.page import write_page
 from ..output.results import Results, read_results
 from ..output.wrinkles import buckling_ratio
 from .drape import DrapeCase, rim
 from .load import load_case
 
-__all__ = ["report"]
+__all__ = ["report", "wrinkles"]
 
 Array = npt.NDArray[np.float64]
 
@@ -115,6 +116,24 @@ def report(
         smallest=smallest_mm,
     )
     return write_page(folder / "report" if out is None else Path(out), analysed(drape, settings))
+
+
+def wrinkles(folder: Path) -> dict[str, float]:
+    """The page's measures of wrinkles in one number each, of the last step of a run.
+
+    Raises:
+        InputError: it is none of a woven sheet.
+    """
+    found = content(analysed(_read(folder, None, None), Settings()))["wrinkles"]
+    waves = (found["out_of_plane"] or {}).get("largest", [])
+    bent = found["curvature"]["percentile_90_beyond_tool_1_m"]
+    numbers = {
+        "wave_amplitude_mm": waves[0]["amplitude_mm"] if waves else 0.0,
+        "curvature_beyond_tool_1_mm": None if bent is None else 1e-3 * bent,
+        "in_plane_amplitude_mm": (found["in_plane"] or {}).get("percentile_90_mm"),
+        "over_buckling_load": (found["compression"] or {}).get("largest_over_buckling_load"),
+    }
+    return {name: float(value) for name, value in numbers.items() if value is not None}
 
 
 def _read(folder: Path, time: float | None, mirror: bool | None) -> Drape:

@@ -13,9 +13,25 @@ from .cases import Case
 if TYPE_CHECKING:
     from .common import Session
 
-__all__ = ["Rig"]
+__all__ = ["Compared", "Rig"]
 
 C = TypeVar("C", bound=Case)
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """A rig's table, whose rows one run has like another of a case that differs in its fabric.
+
+    Attributes:
+        file: its name in the results.
+        columns: what depends on the fabric.
+        along: the column in which rows of one run lie between those of another, increasing; None:
+            both have the same rows.
+    """
+
+    file: str
+    columns: tuple[str, ...]
+    along: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +56,7 @@ class Rig(Generic[C]):
         quarter: whether what a case models is the part x >= 0, y >= 0 of a symmetric sheet.
         steps: time steps of one specimen, from what runs took; None: no estimate is made.
         iterations: of Newton for each step, from what runs took.
+        compared: what a run with another fabric is compared by; None: by its quantities alone.
     """
 
     case: type[C]
@@ -51,3 +68,4 @@ class Rig(Generic[C]):
     quarter: Callable[[C], bool] = lambda case: False
     steps: Callable[[C], float] | None = None
     iterations: float = 3.0
+    compared: Compared | None = None

@@ -14,9 +14,12 @@ from ..inputs.validation import mistakes, one_line
 from ..mechanics.laws.law import CrossingLaw
 from ..output.folder import prepare_folder
 from ..output.record import write_result
+from ..parallel import from_root
 from .cases import Case
 from .common import Session
+from .fabric_file import resolved, taken
 from .registry import rig
+from .uncertainty import ensemble, spread
 from .write_case import case_text
 
 __all__ = ["make_case", "run"]
@@ -43,6 +46,8 @@ def run(
     folder: Path | str,
     *,
     base: Path = Path(),
+    fabric: Path | str | None = None,
+    uncertainty: bool = False,
     laws: Sequence[Callable[[float], CrossingLaw]] = (),
     resume: bool = False,
     pictures: bool = True,
@@ -56,6 +61,10 @@ def run(
         case: what to run.
         folder: for the results; is made.
         base: folder that relative paths in the case count from.
+        fabric: a fabric.yaml whose numbers stand in the place of the case's own; by default the
+            one that the case names, if it names one.
+        uncertainty: run further, with the fabric's numbers changed as they are uncertain and as
+            specimens differ, for what that makes of the results; see rigs.uncertainty.
         laws: of the crossings, beside those of the case: from the area that a crossing stands for
             [mm²] to the law.
         resume: go on from the last accepted step in the folder.
@@ -68,9 +77,17 @@ def run(
         The content of result.json; ``completed`` is false where the solve stopped.
 
     Raises:
-        InputError: the case cannot be run, the folder not be written, or nothing be resumed.
+        InputError: the case or its fabric cannot be run, the folder not be written, or nothing be
+            resumed; uncertainty of a case without a fabric.
     """
     folder = Path(folder)
+    if fabric is not None:
+        case = case.model_copy(update={"fabric": str(Path(fabric).resolve())})
+    whole, found = from_root(comm, lambda: resolved(case, base))
+    if uncertainty and (found is None or resume):
+        raise InputError("uncertainty: allowed is a case with a fabric (fabric: FILE), not resumed")
+    # What is run has the fabric's numbers, and needs its file no more.
+    whole = whole.model_copy(update={"fabric": None})
     prepare_folder(folder, comm)
     session = Session(
         folder,
@@ -80,10 +97,25 @@ def run(
         progress,
         resume,
         pictures,
-        case_text(case, base),
+        case_text(whole, base),
         tuple(laws),
     )
-    result = rig(case.test).run(case, session)
+    further = 0 if not uncertainty or found is None else spread(found).axes.shape[1]
+    session.progress = lambda done, *step: progress(done / (1 + further), *step)
+    result = rig(case.test).run(whole, session)
+    if found is not None:
+        result["fabric"] = {"file": str(base / str(case.fabric)), **taken(found)}
+    if further and found is not None and result["completed"]:
+
+        def runner(changed: Case, place: Path, told: Callable[..., None]) -> dict[str, Any]:
+            return run(
+                changed, place, base=base, laws=laws, pictures=False, progress=told, comm=comm
+            )
+
+        def later(done: float, steps: int, iterations: int) -> None:
+            progress((1.0 + further * done) / (1.0 + further), steps, iterations)
+
+        result["uncertainty"] = ensemble(whole, found, result, folder, runner, later, comm)
     if session.root:
         write_result(folder, result)
     comm.barrier()

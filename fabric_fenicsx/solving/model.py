@@ -27,7 +27,7 @@ from .generalised_alpha import GeneralisedAlpha, backward_difference
 from .history import Histories
 from .newton import Newton
 from .parts import Crossings, CrossoverLaw
-from .sections import SectionLawName, diagonals, elastic_section
+from .sections import STRAIGHT, Bending, SectionLawName, diagonals, elastic_section
 from .snapshot import Snapshot
 from .system import System
 from .update import rotate
@@ -69,6 +69,7 @@ class Model:
         tow_section: which of the sections each tow has, (n_tows,); by default its family's.
         section_law: "linear" takes the sections' stiffness at zero strain, "neo_hookean" the
             whole energy of rectangular ones, "neo_hookean_fibres" with stretch by twist.
+        bending: moments beside those of the sections.
         crossovers: law of the crossings; not needed where the net has none.
         gravity: acceleration [mm/s²].
         load: factor on gravity at a time; by default 1.
@@ -97,6 +98,7 @@ class Model:
         *,
         tow_section: npt.NDArray[np.int64] | None = None,
         section_law: SectionLawName = "linear",
+        bending: Bending = STRAIGHT,
         crossovers: CrossoverLaw | None = None,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         load: Callable[[float], float] = lambda time: 1.0,
@@ -129,7 +131,7 @@ class Model:
         self.fields = self.disc.tows
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
         self._full_gravity, self._load = np.array(gravity), load
-        self.elastic = elastic_section(self.disc, sections, kind, section_law)
+        self.elastic = elastic_section(self.disc, sections, kind, section_law, bending)
         self._constants(mass_scale)
         self.histories = Histories(self.disc)
         self.histories.add("strain", "cells", self.fields.strain_n, beam.strain(self.fields))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -10,13 +12,30 @@ import numpy.typing as npt
 
 from .. import _dolfinx
 from ..fabric.section import FabricSection, RectangularSection, Section
+from ..mechanics.bending_laws import BendingLaw, bent_section
 from ..mechanics.neo_hookean import neo_hookean_section
 from ..mechanics.section_laws import LINEAR, PACKED, ElasticSection, coupled_section
 from .discretisation import Discretisation
 
-__all__ = ["SectionLawName", "diagonals", "elastic_section"]
+__all__ = ["STRAIGHT", "Bending", "SectionLawName", "diagonals", "elastic_section"]
 
 SectionLawName = Literal["linear", "neo_hookean", "neo_hookean_fibres"]
+
+
+@dataclass(frozen=True, slots=True)
+class Bending:
+    """Bending moments beside those of the sections.
+
+    Attributes:
+        laws: per width of fabric, see mechanics.bending_laws.
+        widths: of fabric that each kind of tow stands for [mm].
+    """
+
+    laws: tuple[BendingLaw, ...] = ()
+    widths: tuple[float, ...] = ()
+
+
+STRAIGHT = Bending()
 
 
 def diagonals(sections: Sequence[Section]) -> npt.NDArray[np.float64]:
@@ -30,6 +49,7 @@ def elastic_section(
     sections: Sequence[Section],
     kind: npt.NDArray[np.int64],
     law: SectionLawName,
+    bending: Bending = STRAIGHT,
 ) -> ElasticSection:
     """The law of all tows: the simplest that covers every section.
 
@@ -39,11 +59,17 @@ def elastic_section(
         kind: of each cell of the net, shape (n_cells,).
         law: "linear" for the stiffness at zero strain, "neo_hookean" for the whole energy,
             "neo_hookean_fibres" with the stretch of a flat tow's fibres in twist.
+        bending: moments that are added.
 
     Raises:
         ValueError: an unknown law, or a section that the Neo-Hookean law does not know.
     """
     mesh = disc.tows.mesh
+    if bending.laws:
+        base = elastic_section(disc, sections, kind, law)
+        widths = np.array(bending.widths)[kind][:, None]
+        width = disc.cell_field(_dolfinx.constants_per_cell(mesh, 1), widths)
+        return bent_section(base, width, bending.laws, partial(_dolfinx.constant, mesh))
     if law in ("neo_hookean", "neo_hookean_fibres"):
         fibres = law == "neo_hookean_fibres"
         bases = [s.base if isinstance(s, FabricSection) else s for s in sections]

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from ..inference.criteria import CRITERIA
 from ..inference.diagnosis import Diagnosis
 from ..inference.fitting import Fit
 from .words import parameter_unit
 
-__all__ = ["correlations", "doubts"]
+__all__ = ["correlation_of", "correlations", "doubts"]
 
 #: Share of the largest reading that is a large offset; scatter of specimens that is large.
 LARGE_OFFSET, LARGE_SCATTER = 0.1, 0.3
@@ -77,10 +78,18 @@ def _scatter(model: Fit) -> Iterator[str]:
 def correlations(model: Fit) -> list[tuple[str, str, float]]:
     """Pairs of common parameters whose errors go together, with their correlation."""
     names = [name for name in model.values if name not in model.at_bound]
-    root = model.root[[k for k, name in enumerate(model.values) if name in names]]
-    size = np.linalg.norm(root, axis=1)
-    unit = root / np.where(size > 0.0, size, 1.0)[:, None]
-    r = unit @ unit.T
+    r = correlation_of(model, names)
     together = np.argwhere(np.triu(np.abs(r) > SHOWN_CORRELATION, 1))
     pairs = [(names[i], names[j], float(r[i, j])) for i, j in together]
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
+
+
+def correlation_of(model: Fit, names: Sequence[str]) -> npt.NDArray[np.float64]:
+    """Correlation of some common parameters' errors, (n, n); of what is not known, nothing."""
+    place = {name: k for k, name in enumerate(model.values)}
+    root = model.root[[place[name] for name in names]]
+    size = np.linalg.norm(root, axis=1)
+    unit = root / np.where(size > 0.0, size, 1.0)[:, None]
+    r = unit @ unit.T
+    np.fill_diagonal(r, 1.0)
+    return np.asarray(r)

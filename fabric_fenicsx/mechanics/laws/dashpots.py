@@ -57,7 +57,7 @@ class PowerDashpot(CrossingLaw):
 
     c: Any = per_area("c_N_mm", "moment per area at a rate of 1 rad/s")
     power: Any = number("power", "exponent of the rate; 1 is a linear dashpot")
-    floor: float = 1e-5
+    floor: Any = number("floor_rad_s", "v, rate below which it is linear", default=1e-5)
 
     law = "power_dashpot"
     forms = (

@@ -25,6 +25,7 @@ from ...inputs.parameters import Parameter
 __all__ = [
     "Crossing",
     "CrossingLaw",
+    "Declared",
     "Form",
     "Number",
     "Times",
@@ -109,6 +110,14 @@ def number(key: str, meaning: str, allowed: Any = Positive, default: Any = MISSI
     return _declared(Number(key, meaning, allowed, lambda value, _: value, default))
 
 
+def _said(given: Number, value: Any) -> Any:
+    """A case's value of the law's own number, per area: they are multiples of each other."""
+    if isinstance(value, (list, tuple)):
+        return [_said(given, entry) for entry in value]
+    per = given.own(1.0, 1.0)
+    return value if value is None or per == 1.0 else value / per
+
+
 def _declared(given: Number) -> Any:
     """The field of a law's dataclass."""
     default = MISSING if given.default is MISSING else _converted(given, given.default, 1.0)
@@ -173,7 +182,31 @@ class Form:
         return tuple(law(**{n: number(v) for n, v in one.items()}) for one in self.instances)
 
 
-class CrossingLaw:
+class Declared:
+    """A frozen dataclass of numbers that a case gives by their keys; see per_area and number."""
+
+    @classmethod
+    def numbers(cls) -> dict[str, Number]:
+        """Those that a case gives, by their names in the class."""
+        declared = {f.name: f.metadata.get("number") for f in fields(cls)}  # type: ignore[arg-type]
+        return {name: given for name, given in declared.items() if given is not None}
+
+    @classmethod
+    def of_case(cls, values: Mapping[str, Any], area: float) -> Self:
+        """The law of a crossing that stands for ``area`` [mm²], from a case's values by key.
+
+        Raises:
+            ValueError: the values do not go together.
+        """
+        given = cls.numbers().items()
+        return cls(**{n: _converted(one, values[one.key], area) for n, one in given})
+
+    def keys(self) -> dict[str, Any]:
+        """A case's values by key of this law of 1 mm² of fabric: `of_case` backwards."""
+        return {one.key: _said(one, getattr(self, n)) for n, one in self.numbers().items()}
+
+
+class CrossingLaw(Declared):
     """A moment between warp and weft; a subclass is a frozen dataclass of its numbers.
 
     Attributes:
@@ -227,22 +260,6 @@ class CrossingLaw:
             return stored, None
         before = self.energy(at.gamma_n, {name: at.past(name) for name in memory}, at.number)
         return stored, moment * at.change - (stored - before)
-
-    @classmethod
-    def numbers(cls) -> dict[str, Number]:
-        """Those that a case gives, by their names in the class."""
-        declared = {f.name: f.metadata.get("number") for f in fields(cls)}  # type: ignore[arg-type]
-        return {name: given for name, given in declared.items() if given is not None}
-
-    @classmethod
-    def of_case(cls, values: Mapping[str, Any], area: float) -> Self:
-        """The law of a crossing that stands for ``area`` [mm²], from a case's values by key.
-
-        Raises:
-            ValueError: the values do not go together.
-        """
-        given = cls.numbers().items()
-        return cls(**{n: _converted(one, values[one.key], area) for n, one in given})
 
 
 def signed(x: Any, size: Any) -> Any:

@@ -5,14 +5,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
-from ufl import max_value, min_value, tanh
-
+from ....mechanics.bending_laws import (
+    BendingLaw,
+    CubicBending,
+    HyperbolicBending,
+    SlippingBending,
+    StickSlipBending,
+    TanhBending,
+)
 from ...inference.effects import Effect, Parameter, Values
-from .variant import StripVariant
+from .variant import StripVariant, bending_form
 
 __all__ = ["CANTILEVER_EFFECTS"]
 
@@ -48,27 +52,18 @@ YIELDS = tuple(
 STIFFENING = replace(CUBIC, lower=0.0)
 
 
-def _slip(y: Any) -> Any:
-    """Stick, then slip."""
-    return max_value(min_value(y, 1), -1)
+def _slipping(label: str, law: type[SlippingBending]) -> StripVariant:
+    """A moment beside B κ that does not grow once fibres slip."""
+    return bending_form(label, (YIELD, SLIP), lambda p: (law(p["m_s_N"], p["kappa_s_1_mm"]),))
 
 
-def _bundles(p: Values, kappa: Any) -> Any:
+def _bundles(p: Values) -> tuple[BendingLaw, ...]:
     """Bundles that slip one after the other, and what stiffens: near any odd curve that rises."""
     slipping = (
-        p[m.name] * _slip(kappa / (r * p["kappa_s_1_mm"]))
+        StickSlipBending(p[m.name], r * p["kappa_s_1_mm"])
         for m, r in zip(YIELDS, SLIPS, strict=True)
     )
-    return sum(slipping) + p["b_N_mm3"] * kappa**3
-
-
-def _slipping(label: str, share: Callable[[Any], Any]) -> StripVariant:
-    """A moment m_s f(κ/κ_s) beside B κ; f is odd, has the slope 1 at zero and does not pass 1."""
-    return StripVariant(
-        label,
-        (YIELD, SLIP),
-        moment=lambda p, kappa: p["m_s_N"] * share(kappa / p["kappa_s_1_mm"]),
-    )
+    return *slipping, CubicBending(p["b_N_mm3"])
 
 
 CANTILEVER_EFFECTS = (
@@ -94,14 +89,11 @@ CANTILEVER_EFFECTS = (
         "cantilever",
         "the bending moment is not linear in curvature",
         (
-            _slipping("hyperbolic", lambda y: y / (1 + abs(y))),
-            # Beyond ±20 its derivatives, 1/cosh², would overflow on the way to zero.
-            _slipping("tanh", lambda y: tanh(max_value(min_value(y, 20), -20))),
-            _slipping("stick, then slip", _slip),
-            StripVariant("cubic", (CUBIC,), moment=lambda p, kappa: p["b_N_mm3"] * kappa**3),
-            StripVariant(
-                "bundles side by side", (*YIELDS, STIFFENING, FIRST_SLIP), moment=_bundles
-            ),
+            _slipping("hyperbolic", HyperbolicBending),
+            _slipping("tanh", TanhBending),
+            _slipping("stick, then slip", StickSlipBending),
+            bending_form("cubic", (CUBIC,), lambda p: (CubicBending(p["b_N_mm3"]),)),
+            bending_form("bundles side by side", (*YIELDS, STIFFENING, FIRST_SLIP), _bundles),
         ),
     ),
     Effect(

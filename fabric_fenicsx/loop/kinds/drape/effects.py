@@ -55,6 +55,7 @@ DRAPE_EFFECTS = (
                 solved_at=(0.1, 0.4, 0.8),
             ),
         ),
+        of_fabric=False,
     ),
     Effect(
         "holder_pressure",
@@ -82,6 +83,7 @@ DRAPE_EFFECTS = (
                 solved_at=(50.0, 200.0, 500.0),
             ),
         ),
+        of_fabric=False,
     ),
     Effect(
         "punch_offset",
@@ -101,6 +103,7 @@ DRAPE_EFFECTS = (
                 places=_moved,
             ),
         ),
+        of_fabric=False,
     ),
     Effect(
         "ply_rotation",
@@ -122,5 +125,6 @@ DRAPE_EFFECTS = (
                 places=_turned,
             ),
         ),
+        of_fabric=False,
     ),
 )

@@ -1,0 +1,334 @@
+"""fabric.yaml: the fabric as diagnoses found it, for a case to take; see rigs.fabric_file.
+
+Laws that were found are written by the keys that a case has for them. What a parameter of the fit
+does to these is their derivative, so that its standard error, which is the fit's, is theirs too.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import yaml
+from scipy.linalg import block_diag
+
+from ..errors import InputError
+from ..mechanics.bending_laws import BENDING_LAWS, BendingLaw
+from ..mechanics.laws import LAWS
+from ..mechanics.laws.law import CrossingLaw
+from ..mechanics.laws.tabulated import TabulatedSpring
+from ..output.files import write_text
+from ..rigs.fabric_file import FILE, SCHEMA
+from .inference.curve import Curve
+from .inference.diagnosis import Diagnosis
+from .inference.effects import Effect, Variant
+from .inference.fitting import Fit
+from .measurement.schema import Measurement
+from .report.content import scatter
+from .report.plausibility import correlation_of
+
+__all__ = ["fabric_content", "law_entries", "write_fabric"]
+
+Array = npt.NDArray[np.float64]
+
+BASELINE = {
+    "k1_N": "crossover.k1_N_mm",
+    "k3_N": "crossover.k3_N_mm",
+    "c1_N_s": "crossover.dashpot_N_s_mm",
+    "C1_MPa": "tow.C1_MPa",
+}
+"""Keys of what every fabric has, by the parameter that is fitted."""
+
+PLACES = {"picture_frame": "crossover.laws", "cantilever": "tow.bending"}
+"""Where the laws of a test go."""
+
+CURVE_POINTS = 13
+"""Of a tabulated law: the curves that readings know are smooth."""
+
+HEAD = """\
+# The fabric as it was found by `fabric-fenicsx diagnose`, in the keys of a case. To drape with it:
+#     fabric-fenicsx run CASE.yaml --fabric fabric.yaml [--uncertainty]
+# or `fabric: fabric.yaml` in the case. What is not here is the case's own. `parameters` are the
+# numbers as they were fitted, with the keys that each moves; see docs/fabric.md.
+"""
+
+
+@dataclass(slots=True)
+class _Part:
+    """What one diagnosis adds to the file."""
+
+    test: str
+    tow: dict[str, Any] = field(default_factory=dict)
+    crossover: dict[str, Any] = field(default_factory=dict)
+    parameters: list[dict[str, Any]] = field(default_factory=list)
+    correlations: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    specimens: list[dict[str, Any]] = field(default_factory=list)
+    others: dict[str, list[dict[str, Any]]] = field(
+        default_factory=lambda: {"not_of_the_fabric": [], "without_a_key": []}
+    )
+    known: str = ""
+
+
+def fabric_content(
+    tests: Sequence[tuple[Diagnosis, Sequence[Measurement]]], folder: Path
+) -> dict[str, Any]:
+    """The content of fabric.yaml.
+
+    Args:
+        tests: diagnoses of one fabric, each with the measurements that it is of.
+        folder: from which the files of laws count.
+    """
+    parts = [_part(d, folder) for d, _ in tests]
+    for k, part in enumerate(parts):
+        if part.crossover and any(earlier.crossover for earlier in parts[:k]):
+            # Crossings are those of the first test that has them.
+            parts[k] = _Part(part.test, others=part.others, known=part.known)
+    every = [m for _, measurements in tests for m in measurements]
+    found = [m for d, of in tests for m in of if d.experiment.test == "cantilever"]
+    # A stiffness belongs to the section that it was found with.
+    stated = [m for m in every if "tow" in m.fabric.model_fields_set]
+    of = (found or stated or every)[0].fabric
+    content: dict[str, Any] = {
+        "schema": SCHEMA,
+        "fabric": {
+            "areal_density_kg_m2": of.areal_density_kg_m2,
+            "tow_spacing_mm": of.tow_spacing_mm,
+        },
+    }
+    own = {name: value for part in parts for name, value in part.tow.items()}
+    if found or stated:
+        tow = {name: getattr(of.tow, name) for name in ("width_mm", "height_mm", "C1_MPa")}
+        if "bending_in_plane_Nmm" in of.tow.model_fields_set and of.tow.bending_in_plane_Nmm:
+            tow["bending_in_plane_Nmm"] = of.tow.bending_in_plane_Nmm
+        content["tow"] = tow | own
+    crossovers = [part.crossover for part in parts if part.crossover]
+    if crossovers:
+        content["crossover"] = crossovers[0]
+    content["tests"] = [
+        {
+            "test": d.experiment.test,
+            "titles": [m.title for m in measurements],
+            "verdict": d.verdict,
+            **({"known": part.known} if part.known else {}),
+        }
+        for (d, measurements), part in zip(tests, parts, strict=True)
+    ]
+    content["parameters"] = [p for part in parts for p in part.parameters]
+    matrix = block_diag(*(part.correlations for part in parts if part.parameters))
+    content["correlations"] = matrix.tolist() if content["parameters"] else []
+    content["specimens"] = [s for part in parts for s in part.specimens]
+    for name in ("not_of_the_fabric", "without_a_key"):
+        content[name] = [entry for part in parts for entry in part.others[name]]
+    return _rounded(content)
+
+
+def write_fabric(folder: Path, content: Mapping[str, Any]) -> None:
+    """Write fabric.yaml.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    text = yaml.safe_dump(
+        dict(content), sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
+    )
+    try:
+        write_text(folder / FILE, HEAD + text)
+    except OSError as error:
+        raise InputError(f"{folder}: {FILE} cannot be written ({error.strerror})") from error
+
+
+def law_entries(
+    variant: Variant, values: Mapping[str, float], folder: Path
+) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
+    """The laws of a form, of a crossing or of bending, as entries of a case's list.
+
+    Args:
+        variant: a form with laws.
+        values: of its parameters.
+        folder: from which files count.
+
+    Returns:
+        Entries; by parameter, the derivatives of their keys by dotted places from the list on.
+    """
+    laws = variant.laws  # type: ignore[attr-defined]
+    entries = [_entry(law, folder) for law in laws(values)]
+    slopes: dict[str, dict[str, Any]] = {}
+    for p in variant.parameters:
+        h = 1e-4 * abs(values[p.name]) or 1e-4
+        ends = [laws({**values, p.name: values[p.name] + s * h}) for s in (1.0, -1.0)]
+        slopes[p.name] = {}
+        for i, (above, below) in enumerate(zip(*ends, strict=True)):
+            inside = f"{i}." if "file" not in entries[i] else f"{i}.values."
+            up, down = above.keys(), below.keys()
+            for key in up:
+                slope = _slope(up[key], down[key], 2.0 * h)
+                if np.any(slope):
+                    slopes[p.name][inside + key] = slope
+    return entries, slopes
+
+
+def _slope(up: Any, down: Any, h: float) -> Any:
+    if isinstance(up, list):
+        return [_slope(a, b, h) for a, b in zip(up, down, strict=True)]
+    return 0.0 if up is None else (up - down) / h
+
+
+def _entry(law: CrossingLaw | BendingLaw, folder: Path) -> dict[str, Any]:
+    """A law as a case has it, per area or width."""
+    keys = {key: value for key, value in law.keys().items() if value is not None}
+    if type(law) in (LAWS.get(law.law), BENDING_LAWS.get(law.law)):
+        return {"law": law.law, **keys}
+    file = Path(str(sys.modules[type(law).__module__].__file__))
+    place = os.path.relpath(file.resolve(), folder.resolve())
+    return {"law": "own", "file": place, "name": type(law).__name__, "values": keys}
+
+
+# One diagnosis --------------------------------------------------------------------------------
+
+
+def _part(d: Diagnosis, folder: Path) -> _Part:
+    part = _Part(d.experiment.test)
+    if d.verdict == "unexplained":
+        part.known = _known(d)
+    for effect, variant in _effects(d):
+        laws = getattr(variant, "laws", None)
+        if not effect.of_fabric:
+            part.others["not_of_the_fabric"].append(_other(d, effect, variant))
+        elif laws is None:
+            part.others["without_a_key"].append(_other(d, effect, variant))
+    if part.test == "picture_frame" and d.curve is not None:
+        _add_curve(part, d.curve)
+    else:
+        _add_fitted(part, d.final, _effects(d), folder)
+    return part
+
+
+def _effects(d: Diagnosis) -> list[tuple[Effect, Variant]]:
+    """Those of the reported model, each with its form."""
+    return [
+        (effect, variant)
+        for effect in d.effects
+        for variant in d.final.variants
+        if variant in effect.variants
+    ]
+
+
+def _other(d: Diagnosis, effect: Effect, variant: Variant) -> dict[str, Any]:
+    names = [p.name for p in variant.parameters]
+    return {
+        "effect": effect.name,
+        "form": variant.label,
+        "test": d.experiment.test,
+        "values": {name: d.final.values[name] for name in names},
+        "std": {name: _std(d.final, name) for name in names},
+    }
+
+
+def _std(model: Fit, name: str) -> float | None:
+    """Standard error; None on a bound, or where the data say nothing of it."""
+    error = model.errors[name]
+    return None if name in model.at_bound or not np.isfinite(error) else float(error)
+
+
+def _known(d: Diagnosis) -> str:
+    unit = d.experiment.quantity
+    left = f"what is left of {unit} is {d.baseline.rms(d.baseline.used):.3g} rms, where a reading "
+    left += f"scatters by {d.noise:.3g}"
+    if d.curve is not None:
+        return f"the moment against the angle at one rate, as a table; with the baseline {left}"
+    return f"the baseline's fit; {left}, and no effect of this file explains it"
+
+
+def _add_fitted(
+    part: _Part, model: Fit, effects: Sequence[tuple[Effect, Variant]], folder: Path
+) -> None:
+    """Baseline and laws of a fitted model, with how well each is known."""
+    keys: dict[str, dict[str, Any]] = {}
+    of: dict[str, tuple[str, str]] = {}
+    for name, value in model.values.items():
+        if name in BASELINE:
+            group, _, key = BASELINE[name].partition(".")
+            getattr(part, group)[key] = value
+            keys[name], of[name] = {BASELINE[name]: 1.0}, ("baseline", "")
+    laws: list[dict[str, Any]] = []
+    for effect, variant in effects:
+        if not effect.of_fabric or getattr(variant, "laws", None) is None:
+            continue
+        entries, slopes = law_entries(variant, model.values, folder)
+        nothing = [p.name for p in variant.amplitudes if p.one_sided and p.name in model.at_bound]
+        gone = {int(place.partition(".")[0]) for name in nothing for place in slopes[name]}
+        # A part of a general form that is not needed is not in the fabric.
+        stay = [i for i in range(len(entries)) if i not in gone]
+        place_of = {i: len(laws) + k for k, i in enumerate(stay)}
+        laws += [entries[i] for i in stay]
+        for name, own in slopes.items():
+            placed = {}
+            for place, slope in own.items():
+                i, _, key = place.partition(".")
+                if int(i) in place_of:
+                    placed[f"{PLACES[part.test]}.{place_of[int(i)]}.{key}"] = slope
+            keys[name], of[name] = placed, (effect.name, variant.label)
+    group, _, key = PLACES.get(part.test, "").partition(".")
+    if key:
+        getattr(part, group)[key] = laws
+    part.parameters = [
+        {
+            "name": name,
+            "test": part.test,
+            "effect": of[name][0],
+            **({"form": of[name][1]} if of[name][1] else {}),
+            "value": model.values[name],
+            "std": _std(model, name),
+            "keys": keys[name],
+        }
+        for name in model.values
+        if keys.get(name)
+    ]
+    names = [p["name"] for p in part.parameters]
+    part.correlations = correlation_of(model, names)
+    for group, own_scatter in scatter(model).items():
+        shared = [name for name in group.split() if name in names]
+        if shared and own_scatter["share"] > 0.0:
+            part.specimens.append({"parameters": shared, "test": part.test, **own_scatter})
+
+
+def _add_curve(part: _Part, curve: Curve) -> None:
+    """An elastic law through the curve, from nothing at no shear, not falling."""
+    at = np.linspace(0.0, float(curve.at[-1]), CURVE_POINTS)
+    inside = at[1:] >= float(curve.at[0])
+    at = np.append(0.0, at[1:][inside])
+    value = np.interp(at, curve.at, curve.value)
+    value[0] = 0.0
+    law = TabulatedSpring(tuple(at), tuple(np.maximum.accumulate(np.maximum(value, 0.0))))
+    std = np.interp(at, curve.at, curve.std)
+    std[0] = 0.0
+    part.crossover = {"k1_N_mm": 0.0, "k3_N_mm": 0.0, "dashpot_N_s_mm": 0.0}
+    part.crossover["laws"] = [{"law": law.law, **law.keys()}]
+    part.parameters = [
+        {
+            "name": "curve_band",
+            "test": part.test,
+            "effect": "curve",
+            "value": 0.0,
+            "std": 1.0,
+            "keys": {"crossover.laws.0.moments_N_mm": std.tolist()},
+        }
+    ]
+    part.correlations = np.eye(1)
+
+
+def _rounded(value: Any) -> Any:
+    """Plain data with ten digits of each number."""
+    if isinstance(value, Mapping):
+        return {key: _rounded(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_rounded(inner) for inner in value]
+    if isinstance(value, (float, np.floating)):
+        return float(f"{value:.10g}")
+    return value
