@@ -159,24 +159,24 @@ def law_entries(
     laws = variant.laws  # type: ignore[attr-defined]
     entries = [_entry(law, folder) for law in laws(values)]
     slopes: dict[str, dict[str, Any]] = {}
-    for p in variant.parameters:
-        h = 1e-4 * abs(values[p.name]) or 1e-4
-        ends = [laws({**values, p.name: values[p.name] + s * h}) for s in (1.0, -1.0)]
-        slopes[p.name] = {}
+    for name in (*(p.name for p in variant.parameters), *getattr(variant, "of_baseline", ())):
+        h = 1e-4 * abs(values[name]) or 1e-4
+        ends = [laws({**values, name: values[name] + s * h}) for s in (1.0, -1.0)]
+        slopes[name] = {}
         for i, (above, below) in enumerate(zip(*ends, strict=True)):
             inside = f"{i}." if "file" not in entries[i] else f"{i}.values."
             up, down = above.keys(), below.keys()
             for key in up:
                 slope = _slope(up[key], down[key], 2.0 * h)
                 if np.any(slope):
-                    slopes[p.name][inside + key] = slope
+                    slopes[name][inside + key] = slope
     return entries, slopes
 
 
 def _slope(up: Any, down: Any, h: float) -> Any:
     if isinstance(up, list):
         return [_slope(a, b, h) for a, b in zip(up, down, strict=True)]
-    return 0.0 if up is None else (up - down) / h
+    return 0.0 if up is None or isinstance(up, str) else (up - down) / h
 
 
 def _entry(law: CrossingLaw | BendingLaw, folder: Path) -> dict[str, Any]:
@@ -273,7 +273,8 @@ def _add_fitted(
                 i, _, key = place.partition(".")
                 if int(i) in place_of:
                     placed[f"{PLACES[part.test]}.{place_of[int(i)]}.{key}"] = slope
-            keys[name], of[name] = placed, (effect.name, variant.label)
+            keys[name] = keys.get(name, {}) | placed
+            of.setdefault(name, (effect.name, variant.label))
     group, _, key = PLACES.get(part.test, "").partition(".")
     if key:
         getattr(part, group)[key] = laws

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import pi
 from typing import Any, Literal, Self
 
-from ufl import conditional, cos, exp, gt, lt, max_value, min_value, sin, tanh
+from ufl import conditional, cos, exp, gt, ln, lt, max_value, min_value, sin, tanh
 
 from ...inputs.groups import NotNegative, Positive
 from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, size_of
@@ -25,6 +25,7 @@ Variable = Literal[
     "recent_largest_angle",
     "recent_rate",
 ]
+Kind = Literal["spline", "step", "saturation", "logarithm"]
 Base = Literal["elastic", "viscous", "dissipative", "odd", "even", "odd_in_rate", "even_in_rate"]
 
 
@@ -71,7 +72,8 @@ def shape_of(kind: str, coefficients: Any, x: Any, place: Any = 0.5, width: Any 
     Args:
         kind: "spline", a C¹ quadratic one with as many equal pieces less one as coefficients,
             Σ c_k x^k for the first two, then c_k (x − t_k)₊²; "step", c / (1 + exp(−(x − x₀)/w));
-            "saturation", c (1 − exp(−x/w)); "periodic", c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1);
+            "saturation", c (1 − exp(−x/w)); "logarithm", c ln(1 + x/w); "periodic",
+            c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1);
             "sign", c tanh(x/w).
         coefficients: c or c_k.
         x: where.
@@ -84,6 +86,8 @@ def shape_of(kind: str, coefficients: Any, x: Any, place: Any = 0.5, width: Any 
         return c[0] * (1 / (1 + exp(-(x - place) / width)) - start)
     if kind == "saturation":
         return c[0] * (1 - exp(-x / width))
+    if kind == "logarithm":
+        return c[0] * ln(1 + x / width)
     if kind == "periodic":
         turn = 2 * pi * x / width
         return c[0] * sin(turn) + c[1] * (cos(turn) - 1)
@@ -111,8 +115,8 @@ class ShapedLaw(CrossingLaw):
         reach: v_max [rad, rad/s or s].
         coefficients: of f: [-] of the elastic base, [N mm s] of the viscous one, else [N mm].
         constant: c₀, as they are.
-        shape: "spline", "step" or "saturation".
-        place, width: of the latter two, as shares of v_max.
+        shape: one of those of ``shape_of`` that Kind names.
+        place, width: its x₀ and w, as shares of v_max.
         k1, k3: of the elastic base [N mm].
         stick_angle: of the dissipative base [rad].
         memory: τ of a variable that forgets [s].
@@ -123,9 +127,7 @@ class ShapedLaw(CrossingLaw):
     reach: Any = number("reach", "largest value of the variable that was seen")
     coefficients: Any = number("coefficients", "of the factor, per area", list[float])
     constant: Any = number("constant", "of the factor where the variable is nothing", float, 0.0)
-    shape: Literal["spline", "step", "saturation"] = number(
-        "shape", "of the factor", Literal["spline", "step", "saturation"], "spline"
-    )
+    shape: Kind = number("shape", "of the factor", Kind, "spline")
     place: Any = number("place", "of a step, as a share of the reach", NotNegative, 0.5)
     width: Any = number("width", "of a step or a saturation, as a share of it", Positive, 0.1)
     k1: Any = per_area("k1_N_mm", "linear part of the elastic base", NotNegative, 0.0)

@@ -25,6 +25,8 @@ SPLINES = (1, 2, 3, 5)
 PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
 #: Decays, as shares of the range.
 DECAYS = (0.1, 0.3)
+#: Where a logarithm bends over, as shares of it.
+BENDS = (0.01, 0.1)
 #: Memories, as shares of the longest run.
 MEMORIES = (0.01, 0.05, 0.2)
 #: Angles in which a friction begins to slide [rad].
@@ -171,6 +173,9 @@ def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...]
         yield "step", one, {"shape": "step", "place": place, "width": width}
         decay = Parameter(f"{name}_decay", DECAYS, 0.01, 2.0)
         yield "saturation", one, {"shape": "saturation", "width": decay}
+    if wealth == len(SPLINES):
+        bend = Parameter(f"{name}_bend", BENDS, 1e-3, 1.0)
+        yield "logarithm", one, {"shape": "logarithm", "width": bend}
 
 
 # Rig ------------------------------------------------------------------------------------------
