@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .faults import Fault, disturb, draw_fault, factors, specimens
+from .rich_runs import rich_specimens
 from .screen import rms
 from .sets import Array, MeasurementSet, Run, Truth
 from .strip import Strip
-from .strip_effects import StripEffect, listed, unlisted
+from .strip_discover import TERMS, discoverable
+from .strip_effects import StripEffect, listed
 from .strip_screen import Fits
 
 Rng = np.random.Generator
 LEFT = np.sqrt(1.5**2 - 1)
 INSEPARABLE = 0.3  # times the noise
 TRIES = 6
+RICH = 4  # overhangs to fit of a laboratory that wants to discover
 GRAVITY = 9810.0
 TABLE_3 = {"width_mm": 4.57, "height_mm": 0.04, "density_kg_mm3": 7.0e-6, "C1_MPa": 60000}
 
@@ -30,8 +33,9 @@ class StripPlan:
     effects: tuple[tuple[str, str], ...] = ()
     fault: str = "none"
     ratio: tuple[float, float] = (4.0, 12.0)
-    kind: str | None = None
+    kinds: tuple[str, ...] = ()
     lengths: list[float] | None = None  # in bending lengths
+    rich: bool = False  # the overhangs of a laboratory that wants to discover
     rival: str | None = None  # an effect that one length cannot tell from the one in force
 
 
@@ -44,7 +48,7 @@ class StripDraft:
     lengths: list[float]
     at: list[Array]
     effects: list[StripEffect]
-    holdout: int
+    held: frozenset[int]  # numbers of the strips held out
     sigma: float
     fault: Fault
     names: list[str | None]
@@ -64,13 +68,15 @@ class StripDraft:
         x = x - inside
         for effect in self.effects:
             if effect.camera is not None:
-                x, z = effect.camera(x, z)
+                x, z = effect.camera(x, z, length)
         return x, z
 
 
 def strip_draft(plan: StripPlan, rng: Rng) -> StripDraft:
     """Draw a set until it is a fair question; the last draw says what else is acceptable."""
     fault = draw_fault(plan.fault, rng)
+    if plan.rich:
+        fault = replace(fault, scatter=float(rng.uniform(0.05, 0.10)))
     made = None
     for _ in range(TRIES):
         try:
@@ -88,24 +94,32 @@ def _draft(plan: StripPlan, fault: Fault, rng: Rng) -> StripDraft:
     c = float(rng.uniform(40, 90))
     count = int(rng.integers(4, 8))
     reach = plan.lengths or list(np.linspace(rng.uniform(0.7, 1.0), rng.uniform(2.2, 3.0), count))
+    if plan.rich:  # those held out lie between those to fit
+        count = RICH + int(rng.integers(1, 3))
+        reach = list(np.linspace(reach[0], reach[-1], RICH))
+        gaps = rng.permutation(RICH - 1)[: count - RICH]
+        reach += [reach[n] + rng.uniform(0.35, 0.65) * (reach[1] - reach[0]) for n in gaps]
     lengths = [float(np.round(c * share, 1)) for share in reach]
     points = int(rng.integers(15, 36))
     at = [np.round(np.linspace(length / points, length, points), 4) for length in lengths]
     if plan.lengths:
-        holdout = len(lengths) - 1
+        held = frozenset({len(lengths) - 1})
+    elif plan.rich:
+        held = frozenset(range(RICH, count))
     else:
         order = rng.permutation(count)
         lengths, at = [lengths[n] for n in order], [at[n] for n in order]
-        holdout = count - 1
+        held = frozenset({count - 1})
     effects = [listed(name, form, rng, c, max(lengths)) for name, form in plan.effects]
-    if plan.kind is not None:
-        effects = [unlisted(plan.kind, rng, c, max(lengths))]
+    effects += [discoverable(kind, rng, c, max(lengths)) for kind in plan.kinds]
     names = specimens(len(lengths), fault, bool(rng.random() < 0.5), rng)
+    if plan.rich and "scatter" in fault.parts:
+        names = rich_specimens(len(lengths), held)
     weight = density * GRAVITY * 1e-9
     made = StripDraft(
-        c, weight, lengths, at, effects, holdout, 1.0, fault, names, {}, [], True, density
+        c, weight, lengths, at, effects, held, 1.0, fault, names, {}, [], True, density
     )
-    fitted = [n for n in range(len(lengths)) if n != holdout]
+    fitted = [n for n in range(len(lengths)) if n not in held]
     heights = [made.hang(lengths[n], at[n])[1] for n in fitted]
     fits = Fits(c, weight, [lengths[n] for n in fitted], [at[n] for n in fitted], heights)
     made.accept = [frozenset(name for name, _ in plan.effects)]
@@ -134,7 +148,7 @@ def assess(plan: StripPlan, made: StripDraft, fits: Fits, base: float, fitted: l
     near = [frozenset({name}) for name, left in singles.items() if left < LEFT]
     near = [key for key in near if not key <= names or len(names) > 1]
     made.fair = not near and made.sigma > 0.01 and (keys[0] == "A" == keys[-1] or own > LEFT)
-    if plan.kind is not None:
+    if plan.kinds:
         pairs = {key: left / made.sigma for key, left in fits.pairs(scattered).items()}
         more = [
             key
@@ -165,7 +179,7 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
     """Measure a draft: specimens, noise, roles; and know how to measure one more overhang."""
     fault, sigma = made.fault, made.sigma
     rows = factors(made.names, 1, fault, rng)
-    known = plan.lengths is not None or bool(rng.random() < 0.75)
+    known = plan.lengths is not None or bool(rng.random() < (0.5 if plan.rich else 0.75))
     noises: list[Array] = []
     shapes = [
         made.hang(length, at, float(row[0]))
@@ -189,7 +203,7 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
     runs = []
     for number, (length, at) in enumerate(zip(made.lengths, made.at, strict=True)):
         one = run(length, at, *shapes[number], rng)
-        one.role = "holdout" if number == made.holdout else "fit"
+        one.role = "holdout" if number in made.held else "fit"
         one.specimen = made.names[number]
         runs.append(one)
     separate = plan.lengths is not None or "scatter" in fault.parts or len(runs) <= 4
@@ -201,10 +215,12 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
         tuple(effect.name for effect in made.effects),
         tuple(effect.form for effect in made.effects),
         made.accept,
-        plan.kind is not None,
+        bool(plan.kinds),
         (plan.effects[0][0], plan.rival) if plan.rival is not None else (),
         parameters=comparable(plan, made, c1),
         noise_rms=actual,
+        noise_held_out=rms(np.concatenate([noises[n] for n in sorted(made.held)])),
+        terms=tuple(TERMS[kind] for kind in plan.kinds if plan.rich),
         fairness={**made.fairness, "fair": made.fair},
     )
     more = np.random.default_rng(rng.integers(2**63))
@@ -237,7 +253,7 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
 def comparable(plan: StripPlan, made: StripDraft, c1: float) -> dict[str, float]:
     """The parameters that mean the same in every form of the effects in force."""
     names = {name for name, _ in plan.effects}
-    if plan.kind is not None or "nonlinear_bending" in names:
+    if plan.kinds or "nonlinear_bending" in names:
         return {}
     values = {"C1_MPa": c1}
     for effect in made.effects:

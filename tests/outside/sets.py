@@ -27,6 +27,20 @@ class Run:
     label: str = ""
 
 
+@dataclass(frozen=True)
+class Term:
+    """What a term acts on and the variables it depends on, in the words of the contract."""
+
+    acts_on: str
+    depends_on: frozenset[str]
+
+
+def terms(text: str) -> tuple[Term, ...]:
+    """Terms written as ``moment: rate path | travel: force``; the first is the truth."""
+    parts = (part.split(":") for part in text.split("|"))
+    return tuple(Term(acts.strip(), frozenset(on.split())) for acts, on in parts)
+
+
 @dataclass
 class Truth:
     """What is known of a set, and which answers are right.
@@ -35,6 +49,8 @@ class Truth:
     ``unlisted`` says that ``unexplained`` and ``effect_discovered`` are right.
     ``rivals`` are pairs of which one is to be named with the other among its rivals.
     ``fairness`` holds residuals over the noise: of the baseline, of each listed effect, ...
+    ``terms`` has, for each effect that is to be discovered, what it is and what else is right.
+    ``noise_held_out`` is the noise of the held-out readings alone.
     """
 
     effects: tuple[str, ...] = ()
@@ -44,6 +60,8 @@ class Truth:
     rivals: tuple[str, ...] = ()
     parameters: dict[str, float] = field(default_factory=dict)
     noise_rms: float = 0.0
+    noise_held_out: float = 0.0
+    terms: tuple[tuple[Term, ...], ...] = ()
     fairness: dict[str, Any] = field(default_factory=dict)
 
 
