@@ -17,12 +17,11 @@ from .frame_effects import bouc_wen, maxwell
 from .frame_screen import Columns
 from .motion import angle_at
 from .screen import remove, rms
-from .sets import Array, Term, terms
+from .sets import Array
 
 Law = Callable[[Path], Array]
 
 KNOTS = 8
-UNDECIDED = 10.0  # a difference of log-likelihoods that decides nothing
 
 
 def splines(law: Law, paths: list[Path]) -> list[Law]:
@@ -118,14 +117,3 @@ def terms_left(columns: Columns, base: Array, signal: Array) -> dict[str, float]
             matrix = np.concatenate([columns.column(law, is_force) for law in group], axis=1)
             left[words] = rms(remove(np.concatenate([base, matrix], axis=1), signal[:, None]))
     return left
-
-
-def not_parted(left: dict[str, float], right: tuple[Term, ...], rows: int) -> tuple[Term, ...]:
-    """The terms of no more variables that leave too little to be told from the true one.
-
-    ``left`` is in units of the noise; ``rows`` is the number of fitted readings.
-    """
-    limit = np.sqrt(2 * UNDECIDED / rows)
-    most = len(right[0].depends_on)
-    near = [term for words, rest in left.items() if rest < limit for term in terms(words)]
-    return tuple(term for term in near if term not in right and len(term.depends_on) <= most)

@@ -12,11 +12,11 @@ from .frame import Effect, Frame
 from .frame_discover import TERMS, discoverable
 from .frame_effects import FORMS, Scale, draw
 from .frame_screen import Columns
-from .frame_terms import not_parted, terms_left
+from .frame_terms import terms_left
 from .motion import Programme, make, place
 from .rich_runs import rich_programmes, rich_specimens
 from .screen import Screen, remove, rms
-from .sets import Array, MeasurementSet, Run, Term, Truth
+from .sets import Array, MeasurementSet, Run, Term, Truth, not_parted
 
 Rng = np.random.Generator
 LEFT = np.sqrt(1.5**2 - 1)  # with the noise, 1.5 times the noise

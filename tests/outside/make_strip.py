@@ -9,11 +9,12 @@ import numpy as np
 from .faults import Fault, disturb, draw_fault, factors, specimens
 from .rich_runs import rich_specimens
 from .screen import rms
-from .sets import Array, MeasurementSet, Run, Truth
+from .sets import Array, MeasurementSet, Run, Term, Truth, not_parted
 from .strip import Strip
 from .strip_discover import TERMS, discoverable
 from .strip_effects import StripEffect, listed
 from .strip_screen import Fits
+from .strip_terms import CELLS, Overhangs, strip_terms_left
 
 Rng = np.random.Generator
 LEFT = np.sqrt(1.5**2 - 1)
@@ -57,10 +58,12 @@ class StripDraft:
     fair: bool
     density: float
 
-    def hang(self, length: float, at: Array, factor: float = 1.0) -> tuple[Array, Array]:
+    def hang(
+        self, length: float, at: Array, factor: float = 1.0, cells: int = 240
+    ) -> tuple[Array, Array]:
         """Horizontal and vertical places at arc lengths of a strip of one overhang."""
         inside = sum(effect.inside for effect in self.effects)
-        strip = Strip(self.weight * self.c**3 * factor, self.weight, length + inside, cells=240)
+        strip = Strip(self.weight * self.c**3 * factor, self.weight, length + inside, cells=cells)
         for effect in self.effects:
             if effect.change is not None:
                 effect.change(strip)
@@ -148,6 +151,13 @@ def assess(plan: StripPlan, made: StripDraft, fits: Fits, base: float, fitted: l
     near = [frozenset({name}) for name, left in singles.items() if left < LEFT]
     near = [key for key in near if not key <= names or len(names) > 1]
     made.fair = not near and made.sigma > 0.01 and (keys[0] == "A" == keys[-1] or own > LEFT)
+    if plan.rich:
+        held = sorted(made.held)
+        lengths, at = [made.lengths[n] for n in held], [made.at[n] for n in held]
+        heights = [made.hang(*each)[1] for each in zip(lengths, at, strict=True)]
+        ahead = fits.foretold(Fits(made.c, made.weight, lengths, at, heights)) / made.sigma
+        made.fairness["held_out"] = round(ahead, 3)
+        made.fair = made.fair and ahead > LEFT
     if plan.kinds:
         pairs = {key: left / made.sigma for key, left in fits.pairs(scattered).items()}
         more = [
@@ -168,6 +178,24 @@ def assess(plan: StripPlan, made: StripDraft, fits: Fits, base: float, fitted: l
         made.fair = left < INSEPARABLE and base > 1.5 * made.sigma and made.sigma > 0.005
     else:
         made.accept = made.accept + near
+
+
+def other_terms(plan: StripPlan, made: StripDraft, known: bool) -> tuple[Term, ...]:
+    """The terms that the overhangs cannot tell from the true one, by own least squares."""
+    if not plan.rich or len(plan.kinds) != 1:
+        return ()
+    fitted = [n for n in range(len(made.lengths)) if n not in made.held]
+    lengths, at = [made.lengths[n] for n in fitted], [made.at[n] for n in fitted]
+    shapes = [made.hang(*each, cells=CELLS) for each in zip(lengths, at, strict=True)]
+    keys = [made.names[n] for n in fitted]
+    owners = [keys.index(key) if "scatter" in made.fault.parts else 0 for key in keys]
+    left, rows = strip_terms_left(
+        Overhangs(made.c, made.weight, lengths, at, shapes, owners, known)
+    )
+    rest = {words: value / made.sigma for words, value in left.items()}
+    order = sorted(rest, key=lambda words: rest[words])
+    made.fairness["terms"] = {words: round(rest[words], 3) for words in order[:4]}
+    return not_parted(rest, TERMS[plan.kinds[0]], rows)
 
 
 def strip_set(plan: StripPlan, rng: Rng) -> MeasurementSet:
@@ -211,6 +239,7 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
         runs = _joined(runs)
     actual = rms(np.concatenate(noises))
     fabric, c1 = draw_tow(made, rng)
+    also = other_terms(plan, made, known)
     truth = Truth(
         tuple(effect.name for effect in made.effects),
         tuple(effect.form for effect in made.effects),
@@ -220,7 +249,7 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
         parameters=comparable(plan, made, c1),
         noise_rms=actual,
         noise_held_out=rms(np.concatenate([noises[n] for n in sorted(made.held)])),
-        terms=tuple(TERMS[kind] for kind in plan.kinds if plan.rich),
+        terms=tuple(TERMS[kind] + also for kind in plan.kinds if plan.rich),
         fairness={**made.fairness, "fair": made.fair},
     )
     more = np.random.default_rng(rng.integers(2**63))

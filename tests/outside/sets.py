@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 DIGITS = {"time_s": 7, "displacement_mm": 6, "force_N": 7, "length_mm": 3, "s_mm": 4}
 
 
+UNDECIDED = 10.0  # a difference of log-likelihoods that decides nothing
+
+
 @dataclass
 class Run:
     """One CSV file: its columns by name, its role and the specimen it was measured on."""
@@ -39,6 +42,17 @@ def terms(text: str) -> tuple[Term, ...]:
     """Terms written as ``moment: rate path | travel: force``; the first is the truth."""
     parts = (part.split(":") for part in text.split("|"))
     return tuple(Term(acts.strip(), frozenset(on.split())) for acts, on in parts)
+
+
+def not_parted(left: dict[str, float], right: tuple[Term, ...], rows: int) -> tuple[Term, ...]:
+    """The terms of no more variables that leave too little to be told from the true one.
+
+    ``left`` is in units of the noise; ``rows`` is the number of fitted readings.
+    """
+    limit = np.sqrt(2 * UNDECIDED / rows)
+    most = len(right[0].depends_on)
+    near = [term for words, rest in left.items() if rest < limit for term in terms(words)]
+    return tuple(term for term in near if term not in right and len(term.depends_on) <= most)
 
 
 @dataclass

@@ -12,11 +12,12 @@ import numpy as np
 from .sets import Array, Term, terms
 from .strip import Strip
 from .strip_effects import UNLISTED, Camera, Rng, StripEffect, softening, unlisted
+from .strip_terms import turned
 
 TERMS: dict[str, tuple[Term, ...]] = {
     # new here
     "binder that ends at a line": terms("bending_moment: arc_length"),
-    "part that was bent before": terms("bending_moment: curvature arc_length"),
+    "part that was never bent": terms("bending_moment: curvature arc_length"),
     "fold of the package": terms("rest_curvature: arc_length"),
     "waves of the loom": terms("rest_curvature: arc_length"),
     "overhangs from deeper in the roll": terms("rest_curvature: length"),
@@ -65,13 +66,13 @@ def discoverable(kind: str, rng: Rng, c: float, longest: float) -> StripEffect:
     if kind in along:
         attribute, function = along[kind]
         return StripEffect(kind, kind, lambda strip: setattr(strip, attribute, function))
-    if kind == "part that was bent before":
+    if kind == "part that was never bent":
 
-        def bent(strip: Strip) -> None:
+        def fresh(strip: Strip) -> None:
             middle = (np.arange(strip.cells) + 0.5) * strip.length / strip.cells
-            strip.law = softening(0.3 / c, np.where(middle < place, 0.5 - 0.3 * size, 1.0))
+            strip.law = softening(0.3 / c, np.where(middle > place, 0.5 - 0.3 * size, 1.0))
 
-        return StripEffect(kind, kind, bent)
+        return StripEffect(kind, kind, fresh)
     if kind == "overhangs from deeper in the roll":
 
         def rolled(strip: Strip) -> None:
@@ -81,10 +82,7 @@ def discoverable(kind: str, rng: Rng, c: float, longest: float) -> StripEffect:
         return StripEffect(kind, kind, rolled)
     turn = sign * np.radians(2 + 4 * size)
     cameras: dict[str, Camera] = {
-        "camera off the level": lambda x, z, length: (
-            x * np.cos(turn) - z * np.sin(turn),
-            z * np.cos(turn) + x * np.sin(turn),
-        ),
+        "camera off the level": lambda x, z, length: turned(x, z, turn),
         "scale that changes with the overhang": lambda x, z, length: (
             x * (1 + sign * 0.15 * size * (length / longest - 0.6)),
             z * (1 + sign * 0.15 * size * (length / longest - 0.6)),
