@@ -12,6 +12,7 @@ from .make_strip import StripPlan
 from .strip_effects import FORMS as STRIP_FORMS
 
 RATIO = (4.0, 15.0)  # effect over noise
+EACH = (4.0, 10.0)  # of two effects; a little more, so that each stands out
 FAULTS = ("scatter", "ar1", "proportional", "quantised")
 FRAME_PAIRS = (
     ("damage by the largest angle", "viscosity that grows with the angle"),
@@ -68,7 +69,7 @@ def discover_faults(seed: int) -> Iterator[Job]:
 def discover_pairs(seed: int) -> Iterator[Job]:
     """Two kinds at once: ten pairs in frames, two in strips."""
     for pair in FRAME_PAIRS:
-        plan = Plan(" + ".join(pair), "discover_pairs", (), "none", "rich", RATIO, pair, rich=True)
+        plan = Plan(" + ".join(pair), "discover_pairs", (), "none", "rich", EACH, pair, rich=True)
         yield frame_job(plan, seed)
     for pair in STRIP_PAIRS:
         strip = StripPlan(" + ".join(pair), "discover_pairs", (), "none", RATIO, pair, rich=True)

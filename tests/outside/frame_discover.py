@@ -3,8 +3,8 @@
 ``TERMS`` states for every kind what it acts on and what it depends on.  A factor on the elastic
 moment is named by the variables of the factor alone; one on the dashpot or on a friction has the
 rate or the direction beside them.  A second entry is a pair that no programme of a frame can tell
-from the first: a moment of the angle is a reading of the displacement, a machine that yields is a
-curved load cell, a travel that creeps is a rest angle that creeps.
+from the first: a moment of the angle is a reading of the displacement, a travel that
+creeps is a rest angle that creeps.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from .sets import Array, Term, terms
 
 TERMS: dict[str, tuple[Term, ...]] = {
     # new here
-    "cell that curves beyond a force": terms("reading: force | travel: force"),
-    "grips that open past a force": terms("travel: force | reading: force"),
+    "cell that curves beyond a force": terms("reading: force"),
+    "grips that open past a force": terms("travel: force"),
     "dashpot worn by the path": terms("moment: rate path"),
     "dashpot that thins as it warms": terms("moment: rate time"),
     "dashpot that wakes with the largest angle": terms("moment: rate largest_angle"),
@@ -33,9 +33,10 @@ TERMS: dict[str, tuple[Term, ...]] = {
     "guide that rubs at one place": terms("reading: displacement rate | moment: angle direction"),
     "spring that heals at rest": terms("moment: history"),
     "hump at one angle": terms("moment: angle | reading: displacement"),
-    "pitch error of the spindle": terms("travel: displacement"),
+    "lead error of the spindle": terms("travel: displacement"),
     "pump that cycles with the test": terms("reading: time"),
     "pickup of the drive": terms("reading: rate"),
+    "inertia of the crosshead": terms("reading: acceleration"),
     # those of the family `unlisted`
     "damage by the largest angle": terms("moment: largest_angle"),
     "fading memory of the largest angle": terms("moment: history"),
@@ -52,9 +53,8 @@ TERMS: dict[str, tuple[Term, ...]] = {
     "adhesion at the first shearing": terms("moment: path | moment: largest_angle"),
     "a tow that snaps": terms("moment: largest_angle"),
     "friction of the hinges": terms("moment: direction | moment: rate | reading: force rate"),
-    "inertia of the frame": terms("reading: acceleration"),
     "warming of the load cell": terms("reading: time"),
-    "compliance of the machine": terms("travel: force | reading: force"),
+    "compliance of the machine": terms("travel: force"),
 }
 
 
@@ -67,7 +67,7 @@ def discoverable(kind: str, rng: Rng, scale: Scale) -> Effect:
     time = scale.duration * rng.uniform(0.1, 0.3)
     way = scale.peak * rng.uniform(1.2, 2.5)
     phase = rng.uniform(0, 2 * np.pi)
-    turn = scale.duration * rng.uniform(0.12, 0.3)
+    turn = scale.duration * rng.uniform(0.25, 0.5)
     yields = 0.02 * scale.peak
     unit = 0.01 * scale.travel
 
@@ -86,13 +86,13 @@ def discoverable(kind: str, rng: Rng, scale: Scale) -> Effect:
         "grip regained at rest": lambda p: grip(p) * structure(p, time / 2, 0.3 * scale.peak),
         "spring that heals at rest": lambda p: p.elastic * (structure(p, time, scale.peak) - 1),
         "hump at one angle": lambda p: (
-            np.sign(p.angle) * np.exp(-(((np.abs(p.angle) - at) / (1.5 * width)) ** 2))
+            np.sign(p.angle) * np.exp(-(((np.abs(p.angle) - at) / (2.5 * width)) ** 2))
         ),
     }
     if kind in moments:
         return Effect(kind, kind, moment=moments[kind], compare=())
     typical = scale.travel * scale.rate / scale.peak
-    place, reach = rng.uniform(0.35, 0.6) * scale.travel, 0.13 * scale.travel
+    place, reach = rng.uniform(0.35, 0.6) * scale.travel, 0.2 * scale.travel
     readings: dict[str, Callable[[Path, Array, float], Array]] = {
         "cell that curves beyond a force": lambda p, f, a: (
             a * np.sign(f) * np.maximum(np.abs(f) - 0.4 * scale.force, 0) ** 2 / scale.force
@@ -104,6 +104,9 @@ def discoverable(kind: str, rng: Rng, scale: Scale) -> Effect:
             a * np.sin(2 * np.pi * p.time / turn + phase)
         ),
         "pickup of the drive": lambda p, f, a: a * np.abs(_speed(p)) / typical,
+        "inertia of the crosshead": lambda p, f, a: (
+            a * np.gradient(_speed(p), p.time) * scale.duration / typical
+        ),
     }
     if kind in readings:
         return Effect(kind, kind, reading=readings[kind], compare=())
@@ -117,8 +120,8 @@ def discoverable(kind: str, rng: Rng, scale: Scale) -> Effect:
             shift=lambda t, x, a: x + a * unit * np.expm1(-np.maximum(t, 0) / time),
             compare=(),
         )
-    if kind == "pitch error of the spindle":
-        pitch = scale.travel / rng.uniform(3.0, 6.0)
+    if kind == "lead error of the spindle":
+        pitch = scale.travel / rng.uniform(2.0, 4.5)
         return Effect(
             kind,
             kind,

@@ -21,7 +21,7 @@ from .sets import Array
 
 Law = Callable[[Path], Array]
 
-KNOTS = 8
+KNOTS = 14
 
 
 def splines(law: Law, paths: list[Path]) -> list[Law]:
@@ -78,13 +78,15 @@ def terms_left(columns: Columns, base: Array, signal: Array) -> dict[str, float]
     def grip(path: Path) -> Array:
         return grips[id(path)]
 
+    def way(path: Path) -> Array:
+        return np.asarray(np.tanh(path.rate / rate * 50))
+
     moments: dict[str, list[Law]] = {
         "moment: angle": curves["angle"],
         "moment: rate": curves["rate"] + factor(lambda p: p.elastic, "rate"),
         "moment: direction": [
             grip,
-            lambda p: p.elastic * np.tanh(p.rate / rate * 50),
-            lambda p: np.abs(p.rate),
+            lambda p: p.elastic * way(p),
         ],
         "moment: history": [
             lambda p, t=share * columns.duration, n=power: maxwell(p.angle**n, p.step, t)  # type: ignore[misc]
@@ -98,7 +100,7 @@ def terms_left(columns: Columns, base: Array, signal: Array) -> dict[str, float]
         )
     for name in ("angle", "largest_angle", "path", "time"):
         moments[f"moment: rate {name}"] = factor(lambda p: p.rate, name)
-        moments[f"moment: direction {name}"] = factor(grip, name)
+        moments[f"moment: direction {name}"] = factor(grip, name) + factor(way, name)
     forces: dict[str, list[Law]] = {
         "reading: displacement": curves["displacement"],
         "reading: force": curves["force"],

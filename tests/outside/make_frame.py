@@ -88,9 +88,9 @@ def draw_programmes(plan: Plan, frame: Frame, rng: Rng) -> tuple[list[Programme]
     if plan.rich:
         names = {name for name, _ in plan.effects}
         both = True if "tension_coupling" in names else None
-        if plan.effects == (("crosshead_backlash", "gap"),):
-            both = False
-        turns = "inertia of the frame" in plan.kinds
+        if plan.effects == (("crosshead_backlash", "gap"),) or "permanent set" in plan.kinds:
+            both = False  # slack in pulling only; a rest angle that has one side
+        turns = "inertia of the crosshead" in plan.kinds
         few = plan.fault not in ("scatter", "common")
         return rich_programmes(frame.length, rng, both, few, turns)
     low = max(plan.peak[0], 0.55) if plan.pool == "shear_locking" else plan.peak[0]
@@ -200,7 +200,7 @@ def sensible(effect: Effect) -> bool:
         most[name] = 0.95
     most["fading memory of the largest angle"] = most["warming of the spring"] = 0.95
     most["spring that heals at rest"] = 0.95
-    most["cell that curves beyond a force"] = most["pitch error of the spindle"] = 1.5
+    most["cell that curves beyond a force"], most["lead error of the spindle"] = 1.5, 2.0
     most["clamps that settle"], most["grips that open past a force"] = 8.0, 0.4
     return bool(np.isfinite(effect.amount) and effect.amount <= most.get(effect.name, np.inf))
 

@@ -132,6 +132,13 @@ def _draft(plan: StripPlan, fault: Fault, rng: Rng) -> StripDraft:
     base = fits.left([])
     made.sigma = base / float(rng.uniform(*plan.ratio))
     assess(plan, made, fits, base, fitted)
+    if len(plan.kinds) > 1:
+        for effect in effects:
+            alone = replace(made, effects=[effect])
+            heights = [alone.hang(lengths[n], at[n])[1] for n in fitted]
+            left = Fits(c, weight, fits.lengths, fits.at, heights).left([]) / made.sigma
+            made.fairness[f"alone: {effect.name}"] = round(left, 3)
+            made.fair = made.fair and left > 2.5
     return made
 
 
@@ -207,7 +214,10 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
     """Measure a draft: specimens, noise, roles; and know how to measure one more overhang."""
     fault, sigma = made.fault, made.sigma
     rows = factors(made.names, 1, fault, rng)
-    known = plan.lengths is not None or bool(rng.random() < (0.5 if plan.rich else 0.75))
+    share = 0.75
+    if plan.rich:  # what acts on the reading is hard to know without the arc length
+        share = 0.85 if any(TERMS[kind][0].acts_on == "reading" for kind in plan.kinds) else 0.3
+    known = plan.lengths is not None or bool(rng.random() < share)
     noises: list[Array] = []
     shapes = [
         made.hang(length, at, float(row[0]))
