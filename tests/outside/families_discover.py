@@ -85,7 +85,9 @@ def discover_listed(seed: int) -> Iterator[Job]:
             fault = FAULTS[number // 2 % len(FAULTS)] if number % 2 else "none"
             title, effects = f"{name} ({form})/{fault}", ((name, form),)
             if name in FRAME_FORMS:
-                plan = Plan(title, "discover_listed", effects, fault, "rich", RATIO, rich=True)
+                # More free travel than that no rig has.
+                ratio = (4.0, 8.0) if name == "crosshead_backlash" else RATIO
+                plan = Plan(title, "discover_listed", effects, fault, "rich", ratio, rich=True)
                 yield frame_job(plan, seed)
             else:
                 assert name in STRIP_FORMS

@@ -88,8 +88,8 @@ def draw_programmes(plan: Plan, frame: Frame, rng: Rng) -> tuple[list[Programme]
     if plan.rich:
         names = {name for name, _ in plan.effects}
         both = True if "tension_coupling" in names else None
-        if plan.effects == (("crosshead_backlash", "gap"),) or "permanent set" in plan.kinds:
-            both = False  # slack in pulling only; a rest angle that has one side
+        if "permanent set" in plan.kinds:
+            both = False  # the rest angle of the kind has two sides
         turns = "inertia of the crosshead" in plan.kinds
         few = plan.fault not in ("scatter", "common")
         return rich_programmes(frame.length, rng, both, few, turns)
@@ -182,9 +182,11 @@ def _draft(plan: Plan, fault: Fault, rng: Rng) -> Draft:
         scale_to(effect, columns, several * rng.uniform(*plan.ratio) * sigma)
     frame.effects = effects
     keyed = bool(rng.random() < 0.5)
-    names = specimens(len(programmes), fault, keyed, rng)
+    # A fabric that remembers where it has been is new in each run.
+    lasts = any({"largest_angle", "path"} & TERMS[k][0].depends_on for k in plan.kinds if plan.rich)
+    names = specimens(len(programmes), fault, keyed and not lasts, rng)
     if plan.rich and fault.parts & {"scatter", "common"}:
-        names = rich_specimens(len(programmes), held)
+        names = rich_specimens(len(programmes), held, lasts)
     made = Draft(frame, programmes, held, sigma, fault, names, {}, [], True)
     if any(not sensible(effect) for effect in effects) or columns.reader() > 0.3 * sigma:
         made.fair, made.fairness["senseless"] = False, True

@@ -99,11 +99,13 @@ def rich_programmes(
     return made, frozenset(range(count, count + held))
 
 
-def rich_specimens(runs: int, held: frozenset[int]) -> list[str | None]:
-    """Specimens of a set whose specimens differ: two to fit.
+def rich_specimens(runs: int, held: frozenset[int], each: bool = False) -> list[str | None]:
+    """Specimens of a set whose specimens differ: two to fit, or one of its own for ``each`` run.
 
     The first run held out is on the second of them, another is on a third, which nobody knows.
     """
+    if each:
+        return [chr(ord("A") + number) for number in range(runs)]
     fitted = runs - len(held)
     names = ["A" if n < (fitted + 1) // 2 else "B" for n in range(fitted)]
     return [*names, *["B", "C"][: len(held)]]

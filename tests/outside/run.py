@@ -227,9 +227,9 @@ def main(argv: list[str] | None = None) -> int:
                 print(seed, name, problem, flush=True)
                 continue
             fair = made.truth.fairness
-            print(
-                seed, name, len(made.runs), [sorted(a) for a in made.truth.accept], fair, flush=True
-            )
+            accept = [sorted(names) for names in made.truth.accept]
+            asked = [" | ".join(map(str, right)) for right in made.truth.terms]
+            print(seed, name, len(made.runs), accept, asked, fair, flush=True)
         return 0
     with ThreadPoolExecutor(args.jobs) as pool, Path(args.out).open("a") as stream:
         for lines in pool.map(lambda item: work(item[0], item[1], args), todo):

@@ -37,6 +37,9 @@ class Term:
     acts_on: str
     depends_on: frozenset[str]
 
+    def __str__(self) -> str:
+        return f"{self.acts_on}: {' '.join(sorted(self.depends_on))}"
+
 
 def terms(text: str) -> tuple[Term, ...]:
     """Terms written as ``moment: rate path | travel: force``; the first is the truth."""

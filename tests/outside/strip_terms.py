@@ -88,7 +88,7 @@ def groups(c: float, lengths: list[float], depth: float) -> dict[str, list[Group
         ],
         "reading: distance": [
             Group(KNOTS, camera=lambda x, z, p, run: (x, z + c * np.interp(x, along, p))),
-            Group(KNOTS, camera=lambda x, z, p, run: (x, z * (1 + np.interp(x, along, p) - p[0]))),
+            Group(3, camera=lambda x, z, p, run: (x, z * (1 + np.polyval([*p, 0], x / longest)))),
             Group(1, camera=lambda x, z, p, run: turned(x, z, float(p[0]))),
         ],
         "reading: length": [
