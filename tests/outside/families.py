@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
+from .families_discover import (
+    discover,
+    discover_empty,
+    discover_faults,
+    discover_listed,
+    discover_pairs,
+)
 from .frame_effects import FORMS as FRAME_FORMS
 from .frame_unlisted import KINDS
+from .jobs import Job, frame_job, generator, strip_job
 from .make_frame import Plan, any_form, frame_set
 from .make_strip import StripPlan, strip_set
 from .motion import legs
@@ -18,31 +25,15 @@ from .sets import MeasurementSet
 from .strip_effects import FORMS as STRIP_FORMS
 from .strip_effects import UNLISTED
 
-Rng = np.random.Generator
-Job = tuple[str, Callable[[], MeasurementSet]]
-
 FRAME_FAULTS = ("scatter", "common", "ar1", "proportional", "quantised", "offset")
 TOGETHER = ("scatter+ar1", "scatter+offset", "ar1+quantised", "proportional+offset", "common+ar1")
 STRIP_FAULTS = ("scatter", "ar1", "proportional", "quantised")
 HARD_TOGETHER = ("gap", "soft gap", "dry")
 
 
-def _rng(*key: object) -> Rng:
-    """A generator of its own for every set, the same wherever and in whatever order it is made."""
-    return np.random.default_rng([zlib.crc32(repr(part).encode()) for part in key])
-
-
-def _frame(plan: Plan, seed: int) -> Job:
-    return plan.name, lambda: frame_set(plan, _rng(plan.family, plan.name, seed))
-
-
-def _strip(plan: StripPlan, seed: int) -> Job:
-    return plan.name, lambda: strip_set(plan, _rng(plan.family, plan.name, seed))
-
-
 def listed_with_faults(seed: int) -> Iterator[Job]:
     """Each listed effect under each fault: 49 sets of frames and 20 of strips."""
-    rng = _rng("listed_with_faults", seed)
+    rng = generator("listed_with_faults", seed)
     for name in FRAME_FORMS:
         for fault in (*FRAME_FAULTS, str(rng.choice(TOGETHER))):
             if name == "load_drift" and "offset" in fault:
@@ -54,43 +45,43 @@ def listed_with_faults(seed: int) -> Iterator[Job]:
                 fault,
                 name if rng.random() < 0.7 else "rich",
             )
-            yield _frame(plan, seed)
+            yield frame_job(plan, seed)
     for name, forms in STRIP_FORMS.items():
         for fault in (*STRIP_FAULTS, "scatter+ar1"):
             form = str(rng.choice(forms))
-            yield _strip(
+            yield strip_job(
                 StripPlan(f"{name}/{fault}", "listed_with_faults", ((name, form),), fault), seed
             )
 
 
 def empty_with_faults(seed: int) -> Iterator[Job]:
     """Nothing but the fault: 16 sets of frames and 8 of strips."""
-    rng = _rng("empty_with_faults", seed)
+    rng = generator("empty_with_faults", seed)
     for fault in ("none", *FRAME_FAULTS, *TOGETHER):
         for pool in (
             ("empty", "rich")
             if fault in ("none", "scatter", "ar1", "common")
             else (str(rng.choice(["empty", "rich"])),)
         ):
-            yield _frame(Plan(f"{fault}/{pool}", "empty_with_faults", (), fault, pool), seed)
+            yield frame_job(Plan(f"{fault}/{pool}", "empty_with_faults", (), fault, pool), seed)
     for fault in ("none", *STRIP_FAULTS, "scatter+ar1", "ar1+quantised", "scatter+proportional"):
-        yield _strip(StripPlan(f"strip/{fault}", "empty_with_faults", (), fault), seed)
+        yield strip_job(StripPlan(f"strip/{fault}", "empty_with_faults", (), fault), seed)
 
 
 def unlisted(seed: int) -> Iterator[Job]:
     """Effects on no list: 24 kinds in frames, 12 in strips, a third of them with a fault."""
-    rng = _rng("unlisted", seed)
+    rng = generator("unlisted", seed)
     for kind in KINDS:
         fault = str(rng.choice(["none", "none", "ar1", "scatter", "proportional", "quantised"]))
-        plan = Plan(kind, "unlisted", (), fault, "rich", (5.0, 12.0), kind)
+        plan = Plan(kind, "unlisted", (), fault, "rich", (5.0, 12.0), (kind,))
         if kind == "inertia of the frame":
             plan = replace(
                 plan, programmes=["harmonic", "harmonic", "both", "harmonic", "harmonic"]
             )
-        yield _frame(plan, seed)
+        yield frame_job(plan, seed)
     for kind in UNLISTED:
         fault = str(rng.choice(["none", "none", "ar1", "quantised"]))
-        yield _strip(StripPlan(kind, "unlisted", (), fault, (5.0, 12.0), kind), seed)
+        yield strip_job(StripPlan(kind, "unlisted", (), fault, (5.0, 12.0), (kind,)), seed)
 
 
 def clean_listed(seed: int) -> Iterator[Job]:
@@ -98,14 +89,14 @@ def clean_listed(seed: int) -> Iterator[Job]:
     for name, forms in FRAME_FORMS.items():
         for form in forms:
             plan = Plan(f"{name}/{form}", "clean_listed", ((name, form),), "none", name)
-            yield _frame(plan, seed)
+            yield frame_job(plan, seed)
     for name, forms in STRIP_FORMS.items():
         for form in forms:
-            yield _strip(StripPlan(f"{name}/{form}", "clean_listed", ((name, form),)), seed)
+            yield strip_job(StripPlan(f"{name}/{form}", "clean_listed", ((name, form),)), seed)
 
 
 def _several(family: str, count: int, seed: int) -> Iterator[Job]:
-    rng = _rng(family, seed)
+    rng = generator(family, seed)
     programmes = ["growing both", "hold both", "saw both", "both", "stair", "cycle"]
     for names in combinations(FRAME_FORMS, count):
         effects = tuple(any_form(name, rng, HARD_TOGETHER) for name in names)
@@ -120,7 +111,7 @@ def _several(family: str, count: int, seed: int) -> Iterator[Job]:
             programmes=["growing both", "hold both", *programmes[:4]],
             peak=(0.6, 0.9),
         )
-        yield _frame(plan, seed)
+        yield frame_job(plan, seed)
 
 
 def pairs(seed: int) -> Iterator[Job]:
@@ -135,7 +126,7 @@ def threes(seed: int) -> Iterator[Job]:
 
 def weak_even(seed: int) -> Iterator[Job]:
     """A weak even force under programmes with both signs of the angle: 12 sets."""
-    rng = _rng("weak_even", seed)
+    rng = generator("weak_even", seed)
     for form in FRAME_FORMS["tension_coupling"]:
         for fault in ("none", str(rng.choice(["ar1", "scatter", "proportional", "quantised"]))):
             plan = Plan(
@@ -146,7 +137,7 @@ def weak_even(seed: int) -> Iterator[Job]:
                 "tension_coupling",
                 (2.0, 4.0),
             )
-            yield _frame(plan, seed)
+            yield frame_job(plan, seed)
 
 
 def separable_pairs(seed: int) -> Iterator[Job]:
@@ -203,7 +194,7 @@ def _later(plan: Plan | StripPlan, seed: int) -> Callable[[], MeasurementSet]:
     """Make the set of a pair, with advice, when it is asked for."""
 
     def build() -> MeasurementSet:
-        rng = _rng(plan.family, plan.name, seed)
+        rng = generator(plan.family, plan.name, seed)
         made = frame_set(plan, rng) if isinstance(plan, Plan) else strip_set(plan, rng)
         return _advised(made)
 
@@ -228,6 +219,14 @@ def _advised(made: MeasurementSet) -> MeasurementSet:
     return made
 
 
+DISCOVERING: dict[str, Callable[[int], Iterator[Job]]] = {
+    "discover": discover,
+    "discover_faults": discover_faults,
+    "discover_pairs": discover_pairs,
+    "discover_listed": discover_listed,
+    "discover_empty": discover_empty,
+}
+
 FAMILIES: dict[str, Callable[[int], Iterator[Job]]] = {
     "listed_with_faults": listed_with_faults,
     "empty_with_faults": empty_with_faults,
@@ -237,4 +236,5 @@ FAMILIES: dict[str, Callable[[int], Iterator[Job]]] = {
     "threes": threes,
     "weak_even": weak_even,
     "separable_pairs": separable_pairs,
+    **DISCOVERING,
 }

@@ -43,6 +43,7 @@ class Path:
 
 Moment = Callable[[Path], Array]
 Travel = Callable[[Array, float], Array]
+Shift = Callable[[Array, Array, float], Array]
 Reading = Callable[[Path, Array, float], Array]
 
 
@@ -51,8 +52,9 @@ class Effect:
     """One effect with an amount; exactly one of its functions is set.
 
     ``moment`` gives a moment for amount 1; ``travel`` turns the crosshead's travel into the
-    frame's; ``reading`` gives what is added to the force; ``yields`` says that the machine gives
-    way, by so many mm per N for amount 1.  ``known`` are parameters for amount 1 that a report may
+    frame's, ``shift`` does so with the time; ``reading`` gives what is added to the force;
+    ``yields`` says that the machine gives way, by so many mm per N for amount 1, past the force
+    ``holds``.  ``known`` are parameters for amount 1 that a report may
     name; ``compare`` are those of the baseline that keep their meaning beside this form.
     """
 
@@ -63,6 +65,8 @@ class Effect:
     travel: Travel | None = None
     reading: Reading | None = None
     yields: float | None = None
+    shift: Shift | None = None
+    holds: float = 0.0
     compare: tuple[str, ...] = ("k1_N", "k3_N", "c1_N_s")
     known: dict[str, float] = field(default_factory=dict)
 
@@ -85,6 +89,8 @@ class Frame:
         for effect in self.effects:
             if effect.travel is not None:
                 travel = effect.travel(travel, effect.amount)
+            if effect.shift is not None:
+                travel = effect.shift(fine.time, travel, effect.amount)
         return self._path(fine.time, fine.travel, travel, run, factors), fine.reads
 
     def _path(self, time: Array, crosshead: Array, travel: Array, run: int, f: Array) -> Path:
@@ -112,7 +118,7 @@ class Frame:
         path, reads = self.path(programme, run, f)
         for effect in self.effects:
             if effect.yields is not None:
-                travel = self._yielding(path, effect.amount * effect.yields, f)
+                travel = self._yielding(path, effect.amount * effect.yields, effect.holds, f)
                 path = self._path(path.time, path.travel, travel, run, f)
         force = self._force(path, float(f[3]))
         total = force
@@ -121,8 +127,11 @@ class Frame:
                 total = total + effect.reading(path, force, effect.amount)
         return path.time[reads], path.travel[reads], np.asarray(total[reads])
 
-    def _yielding(self, path: Path, give: float, f: Array) -> Array:
-        """The frame's travel where the machine yields by ``give`` mm per N: an implicit step."""
+    def _yielding(self, path: Path, give: float, holds: float, f: Array) -> Array:
+        """The frame's travel where the machine yields by ``give`` mm per N: an implicit step.
+
+        Below the force ``holds`` it does not yield.
+        """
         k1, k3, c1 = self.k1 * f[0] * f[3], self.k3 * f[1] * f[3], self.c1 * f[2] * f[3]
         share = self.fabric**2 / self.length
         angle, out = 0.0, []
@@ -133,8 +142,10 @@ class Frame:
                 moment = k1 * angle + k3 * angle**3 + c1 * (angle - before) / path.step
                 slope = k1 + 3 * k3 * angle**2 + c1 / path.step
                 at = self.length * (2 * math.cos(math.pi / 4 - angle / 2) - math.sqrt(2))
-                error = at + give * share * moment / sine - goal
-                change = error / (self.length * sine + give * share * slope / sine)
+                force = share * moment / sine
+                past = give if abs(force) > holds else 0.0
+                error = at + past * (force - math.copysign(holds, force)) - goal
+                change = error / (self.length * sine + past * share * slope / sine)
                 angle -= change
                 if abs(change) < 1e-10:
                     break

@@ -12,7 +12,8 @@ from .frame_effects import Rng, Scale, maxwell
 from .sets import Array
 
 
-def _step(x: Array, at: float, width: float) -> Array:
+def smooth_step(x: Array, at: float, width: float) -> Array:
+    """A step from 0 to 1 about a place."""
     return np.asarray(1 / (1 + np.exp(-np.clip((x - at) / width, -60, 60))))
 
 
@@ -26,7 +27,7 @@ def _faded_largest(path: Path, memory: float) -> Array:
     return out
 
 
-def _structure(path: Path, build: float, breaking: float) -> Array:
+def structure(path: Path, build: float, breaking: float) -> Array:
     """A structure that shear breaks and rest rebuilds (thixotropy), 1 when at rest."""
     state, out = 1.0, np.ones_like(path.angle)
     for number, rate in enumerate(np.abs(path.rate)):
@@ -64,16 +65,16 @@ def unlisted(kind: str, rng: Rng, scale: Scale) -> Effect:
     way = scale.peak * rng.uniform(1.0, 2.5)
     phase = rng.uniform(0, 2 * np.pi)
     moments: dict[str, Callable[[Path], Array]] = {
-        "damage by the largest angle": lambda p: -p.elastic * _step(p.largest, at, width),
+        "damage by the largest angle": lambda p: -p.elastic * smooth_step(p.largest, at, width),
         "fading memory of the largest angle": lambda p: (
-            -p.elastic * _step(_faded_largest(p, time), at, width)
+            -p.elastic * smooth_step(_faded_largest(p, time), at, width)
         ),
         "wear with the path": lambda p: -p.elastic * (1 - np.exp(-p.way / way)),
         "ageing": lambda p: p.elastic * np.log1p(np.maximum(p.time, 0) / (time / 5)),
         "warming of the spring": lambda p: -p.elastic * p.time / scale.duration,
         "viscosity that grows with the angle": lambda p: p.rate * (p.angle / scale.peak) ** 2,
-        "viscosity past an angle": lambda p: p.rate * _step(np.abs(p.angle), at, width),
-        "thixotropic dashpot": lambda p: p.rate * _structure(p, time, scale.peak * 0.7),
+        "viscosity past an angle": lambda p: p.rate * smooth_step(np.abs(p.angle), at, width),
+        "thixotropic dashpot": lambda p: p.rate * structure(p, time, scale.peak * 0.7),
         "one-sided dashpot": lambda p: np.abs(p.rate),
         "spring that stiffens with the rate": lambda p: (
             p.elastic * np.log1p(np.abs(p.rate) / (0.2 * scale.rate))

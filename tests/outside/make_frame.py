@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .faults import Fault, disturb, draw_fault, factors, offsets, specimens
 from .frame import Effect, Frame
+from .frame_discover import TERMS, discoverable
 from .frame_effects import FORMS, Scale, draw
 from .frame_screen import Columns
-from .frame_unlisted import unlisted
+from .frame_terms import terms_left
 from .motion import Programme, make, place
+from .rich_runs import rich_programmes, rich_specimens
 from .screen import Screen, remove, rms
-from .sets import MeasurementSet, Run, Truth
+from .sets import Array, MeasurementSet, Run, Term, Truth, not_parted
 
 Rng = np.random.Generator
 LEFT = np.sqrt(1.5**2 - 1)  # with the noise, 1.5 times the noise
@@ -44,7 +47,7 @@ class Plan:
     fault: str = "none"
     pool: str = "empty"
     ratio: tuple[float, float] = (4.0, 12.0)  # effect over noise
-    kind: str | None = None  # of an unlisted effect
+    kinds: tuple[str, ...] = ()  # of unlisted effects
     programmes: list[str] | None = None
     peak: tuple[float, float] = (0.3, 0.9)
     span: float | None = None
@@ -52,6 +55,7 @@ class Plan:
     skip: float = 0.0  # share of the readings that is missing at the start of a run
     cubic: float = 1.0  # factor on the cubic spring
     quiet: float = 1.0  # factor on the noise, and on the dashpot
+    rich: bool = False  # the programmes of a laboratory that wants to discover
 
 
 @dataclass
@@ -60,13 +64,14 @@ class Draft:
 
     frame: Frame
     programmes: list[Programme]
-    holdout: int
+    held: frozenset[int]  # numbers of the runs held out
     sigma: float
     fault: Fault
     names: list[str | None]
     fairness: dict[str, object]
     accept: list[frozenset[str]]
     fair: bool
+    also: tuple[Term, ...] = ()  # terms that the programmes cannot tell from the true one
 
 
 def draw_rig(rng: Rng) -> Frame:
@@ -78,8 +83,16 @@ def draw_rig(rng: Rng) -> Frame:
     return Frame(length, fabric, k1, k3, 0.0)
 
 
-def draw_programmes(plan: Plan, frame: Frame, rng: Rng) -> tuple[list[Programme], int]:
-    """The runs' programmes and the number of the one that is held out."""
+def draw_programmes(plan: Plan, frame: Frame, rng: Rng) -> tuple[list[Programme], frozenset[int]]:
+    """The runs' programmes and the numbers of those that are held out."""
+    if plan.rich:
+        names = {name for name, _ in plan.effects}
+        both = True if "tension_coupling" in names else None
+        if "permanent set" in plan.kinds:
+            both = False  # the rest angle of the kind has two sides
+        turns = "inertia of the crosshead" in plan.kinds
+        few = plan.fault not in ("scatter", "common")
+        return rich_programmes(frame.length, rng, both, few, turns)
     low = max(plan.peak[0], 0.55) if plan.pool == "shear_locking" else plan.peak[0]
     peak = rng.uniform(low, plan.peak[1])
     pool = POOLS[plan.pool]
@@ -110,7 +123,7 @@ def draw_programmes(plan: Plan, frame: Frame, rng: Rng) -> tuple[list[Programme]
             rate /= fastest  # what is held out is no faster than what is fitted
         one = make(kind, reach, min(rate, 2.0 / fastest), frame.length, rng)
         made.append(replace(one, skip=10 + int(plan.skip * one.readings) if plan.skip else 0))
-    return made, holdout
+    return made, frozenset({holdout})
 
 
 def scale_to(effect: Effect, columns: Columns, target: float) -> None:
@@ -130,6 +143,8 @@ def scale_to(effect: Effect, columns: Columns, target: float) -> None:
 def draft(plan: Plan, rng: Rng) -> Draft:
     """Draw a set until it is a fair question; the last draw says what else is acceptable."""
     fault = draw_fault(plan.fault, rng)
+    if plan.rich:
+        fault = replace(fault, scatter=float(rng.uniform(0.05, 0.10)))
     best = None
     for _ in range(TRIES):
         made = _draft(plan, fault, rng)
@@ -145,8 +160,8 @@ def draft(plan: Plan, rng: Rng) -> Draft:
 def _draft(plan: Plan, fault: Fault, rng: Rng) -> Draft:
     frame = draw_rig(rng)
     frame.k3 *= plan.cubic
-    programmes, holdout = draw_programmes(plan, frame, rng)
-    fitted = [n for n in range(len(programmes)) if n != holdout]
+    programmes, held = draw_programmes(plan, frame, rng)
+    fitted = [n for n in range(len(programmes)) if n not in held]
     columns = Columns(frame, [programmes[n] for n in fitted], fitted)
     frame.c1 = float(min(plan.quiet * rng.uniform(0.1, 0.5) * columns.viscous_share(), 5.0))
     columns = Columns(frame, [programmes[n] for n in fitted], fitted)
@@ -161,15 +176,18 @@ def _draft(plan: Plan, fault: Fault, rng: Rng) -> Draft:
         float(np.max(np.abs(columns.exact()))),
     )
     effects = [draw(name, form, rng, scale) for name, form in plan.effects]
-    if plan.kind is not None:
-        effects = [unlisted(plan.kind, rng, scale)]
+    effects += [discoverable(kind, rng, scale) for kind in plan.kinds]
     several = 1.3 if len(effects) > 1 else 1.0
     for effect in effects:
         scale_to(effect, columns, several * rng.uniform(*plan.ratio) * sigma)
     frame.effects = effects
     keyed = bool(rng.random() < 0.5)
-    names = specimens(len(programmes), fault, keyed, rng)
-    made = Draft(frame, programmes, holdout, sigma, fault, names, {}, [], True)
+    # A fabric that remembers where it has been is new in each run.
+    lasts = any({"largest_angle", "path"} & TERMS[k][0].depends_on for k in plan.kinds if plan.rich)
+    names = specimens(len(programmes), fault, keyed and not lasts, rng)
+    if plan.rich and fault.parts & {"scatter", "common"}:
+        names = rich_specimens(len(programmes), held, lasts)
+    made = Draft(frame, programmes, held, sigma, fault, names, {}, [], True)
     if any(not sensible(effect) for effect in effects) or columns.reader() > 0.3 * sigma:
         made.fair, made.fairness["senseless"] = False, True
         return made
@@ -183,6 +201,9 @@ def sensible(effect: Effect) -> bool:
     for name in ("damage by the largest angle", "wear with the path", "a tow that snaps"):
         most[name] = 0.95
     most["fading memory of the largest angle"] = most["warming of the spring"] = 0.95
+    most["spring that heals at rest"] = 0.95
+    most["cell that curves beyond a force"], most["lead error of the spindle"] = 1.5, 2.0
+    most["clamps that settle"], most["grips that open past a force"] = 8.0, 0.4
     return bool(np.isfinite(effect.amount) and effect.amount <= most.get(effect.name, np.inf))
 
 
@@ -210,7 +231,11 @@ def assess(plan: Plan, made: Draft, columns: Columns, fitted: list[int]) -> None
         "singles": {name: round(left, 3) for name, left in sorted(singles.items())},
     }
     made.fair = not loose or own > LEFT
-    if plan.kind is not None:
+    if plan.rich:
+        ahead = foretold(made, columns, signal) / made.sigma
+        made.fairness["held_out"] = round(ahead, 3)
+        made.fair = made.fair and ahead > LEFT
+    if plan.kinds:
         pairs = {key: left / made.sigma for key, left in screen.pairs().items()}
         near = [frozenset({name}) for name, left in singles.items() if left < LEFT]
         near += [
@@ -223,6 +248,15 @@ def assess(plan: Plan, made: Draft, columns: Columns, fitted: list[int]) -> None
         made.fairness["pair"] = [sorted(best), round(pairs[best], 3)]
         made.accept = near
         made.fair = made.fair and not near
+        if plan.rich and len(plan.kinds) == 1:
+            left_by = terms_left(columns, columns.base(scattered), signal)
+            rest = {words: left / made.sigma for words, left in left_by.items()}
+            rows = sum(made.programmes[n].readings for n in fitted)
+            made.also = not_parted(rest, TERMS[plan.kinds[0]], rows)
+            order = sorted(rest, key=lambda words: rest[words])
+            made.fairness["terms"] = {words: round(rest[words], 3) for words in order[:4]}
+        if len(plan.kinds) > 1:
+            beyond_the_others(plan.kinds, made, columns, columns.base(scattered, drift))
     elif plan.rival is not None:
         left = singles.get(plan.rival, np.inf)
         rows = sum(len(read) for read in columns.reads) * columns.thin
@@ -241,18 +275,30 @@ def assess(plan: Plan, made: Draft, columns: Columns, fitted: list[int]) -> None
         if plan.effects[0][1] == "stribeck":
             made.accept += [key | {"rate_hardening"} for key in beside]
     else:
-        own_signals = [columns.signal([effect]) for effect in made.frame.effects]
-        for number, name in enumerate(names):
-            others = [s[:, None] for n, s in enumerate(own_signals) if n != number]
-            beyond = np.concatenate([columns.base(scattered, drift), *others], axis=1)
-            left = rms(remove(beyond, own_signals[number][:, None])) / made.sigma
-            made.fairness[f"beyond the others: {name}"] = round(left, 3)
-            made.fair = made.fair and left > 2.5
+        beyond_the_others(names, made, columns, columns.base(scattered, drift))
         fewer = {key: left / made.sigma for key, left in screen.pairs().items()}
         near = [frozenset({name}) for name, left in singles.items() if left < LEFT]
         near += [k for k, left in fewer.items() if left < LEFT and not k >= frozenset(names)]
         made.accept = beside + near
         made.fair = made.fair and not near
+
+
+def beyond_the_others(names: Sequence[str], made: Draft, columns: Columns, base: Array) -> None:
+    """Screen whether each of several effects stands out when the others are known."""
+    own = [columns.signal([effect]) for effect in made.frame.effects]
+    for number, name in enumerate(names):
+        others = [signal[:, None] for n, signal in enumerate(own) if n != number]
+        left = rms(remove(np.concatenate([base, *others], axis=1), own[number][:, None]))
+        made.fairness[f"beyond the others: {name}"] = round(left / made.sigma, 3)
+        made.fair = made.fair and left > 2.5 * made.sigma
+
+
+def foretold(made: Draft, columns: Columns, signal: Array) -> float:
+    """The rms of what the baseline fitted to the fitted runs leaves of the runs held out."""
+    frame, held = made.frame, sorted(made.held)
+    ahead = Columns(frame, [made.programmes[n] for n in held], held)
+    amounts = np.linalg.lstsq(columns.base(), signal, rcond=None)[0]
+    return rms(ahead.signal(frame.effects) - ahead.base() @ amounts)
 
 
 def measure(plan: Plan, made: Draft, rng: Rng) -> MeasurementSet:
@@ -267,7 +313,7 @@ def measure(plan: Plan, made: Draft, rng: Rng) -> MeasurementSet:
         reading = disturb(force + shift[number], sigma, typical, fault, rng)
         noises.append(reading - force - shift[number])
         columns = {"time_s": time, "displacement_mm": travel, "force_N": reading}
-        role = "holdout" if number == made.holdout else "fit"
+        role = "holdout" if number in made.held else "fit"
         label = made.programmes[number].label
         runs.append(Run(columns, role, made.names[number], label))
     actual = rms(np.concatenate(noises))
@@ -277,10 +323,12 @@ def measure(plan: Plan, made: Draft, rng: Rng) -> MeasurementSet:
         tuple(effect.name for effect in frame.effects),
         tuple(effect.form for effect in frame.effects),
         made.accept,
-        plan.kind is not None,
+        bool(plan.kinds),
         (plan.effects[0][0], plan.rival) if plan.rival is not None else (),
         parameters=comparable(frame),
         noise_rms=actual,
+        noise_held_out=rms(np.concatenate([noises[n] for n in sorted(made.held)])),
+        terms=tuple(TERMS[kind] + made.also for kind in plan.kinds if plan.rich),
         fairness={**made.fairness, "fair": made.fair},
     )
     more = np.random.default_rng(rng.integers(2**63))

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .faults import Fault, disturb, draw_fault, factors, specimens
+from .rich_runs import rich_specimens
 from .screen import rms
-from .sets import Array, MeasurementSet, Run, Truth
+from .sets import Array, MeasurementSet, Run, Term, Truth, not_parted
 from .strip import Strip
-from .strip_effects import StripEffect, listed, unlisted
+from .strip_discover import TERMS, discoverable
+from .strip_effects import StripEffect, listed
 from .strip_screen import Fits
+from .strip_terms import CELLS, Overhangs, strip_terms_left
 
 Rng = np.random.Generator
 LEFT = np.sqrt(1.5**2 - 1)
 INSEPARABLE = 0.3  # times the noise
 TRIES = 6
+RICH = 4  # overhangs to fit of a laboratory that wants to discover
 GRAVITY = 9810.0
 TABLE_3 = {"width_mm": 4.57, "height_mm": 0.04, "density_kg_mm3": 7.0e-6, "C1_MPa": 60000}
 
@@ -30,8 +34,9 @@ class StripPlan:
     effects: tuple[tuple[str, str], ...] = ()
     fault: str = "none"
     ratio: tuple[float, float] = (4.0, 12.0)
-    kind: str | None = None
+    kinds: tuple[str, ...] = ()
     lengths: list[float] | None = None  # in bending lengths
+    rich: bool = False  # the overhangs of a laboratory that wants to discover
     rival: str | None = None  # an effect that one length cannot tell from the one in force
 
 
@@ -44,7 +49,7 @@ class StripDraft:
     lengths: list[float]
     at: list[Array]
     effects: list[StripEffect]
-    holdout: int
+    held: frozenset[int]  # numbers of the strips held out
     sigma: float
     fault: Fault
     names: list[str | None]
@@ -53,10 +58,12 @@ class StripDraft:
     fair: bool
     density: float
 
-    def hang(self, length: float, at: Array, factor: float = 1.0) -> tuple[Array, Array]:
+    def hang(
+        self, length: float, at: Array, factor: float = 1.0, cells: int = 240
+    ) -> tuple[Array, Array]:
         """Horizontal and vertical places at arc lengths of a strip of one overhang."""
         inside = sum(effect.inside for effect in self.effects)
-        strip = Strip(self.weight * self.c**3 * factor, self.weight, length + inside, cells=240)
+        strip = Strip(self.weight * self.c**3 * factor, self.weight, length + inside, cells=cells)
         for effect in self.effects:
             if effect.change is not None:
                 effect.change(strip)
@@ -64,13 +71,15 @@ class StripDraft:
         x = x - inside
         for effect in self.effects:
             if effect.camera is not None:
-                x, z = effect.camera(x, z)
+                x, z = effect.camera(x, z, length)
         return x, z
 
 
 def strip_draft(plan: StripPlan, rng: Rng) -> StripDraft:
     """Draw a set until it is a fair question; the last draw says what else is acceptable."""
     fault = draw_fault(plan.fault, rng)
+    if plan.rich:
+        fault = replace(fault, scatter=float(rng.uniform(0.05, 0.10)))
     made = None
     for _ in range(TRIES):
         try:
@@ -88,24 +97,32 @@ def _draft(plan: StripPlan, fault: Fault, rng: Rng) -> StripDraft:
     c = float(rng.uniform(40, 90))
     count = int(rng.integers(4, 8))
     reach = plan.lengths or list(np.linspace(rng.uniform(0.7, 1.0), rng.uniform(2.2, 3.0), count))
+    if plan.rich:  # those held out lie between those to fit
+        count = RICH + int(rng.integers(1, 3))
+        reach = list(np.linspace(reach[0], reach[-1], RICH))
+        gaps = rng.permutation(RICH - 1)[: count - RICH]
+        reach += [reach[n] + rng.uniform(0.35, 0.65) * (reach[1] - reach[0]) for n in gaps]
     lengths = [float(np.round(c * share, 1)) for share in reach]
     points = int(rng.integers(15, 36))
     at = [np.round(np.linspace(length / points, length, points), 4) for length in lengths]
     if plan.lengths:
-        holdout = len(lengths) - 1
+        held = frozenset({len(lengths) - 1})
+    elif plan.rich:
+        held = frozenset(range(RICH, count))
     else:
         order = rng.permutation(count)
         lengths, at = [lengths[n] for n in order], [at[n] for n in order]
-        holdout = count - 1
+        held = frozenset({count - 1})
     effects = [listed(name, form, rng, c, max(lengths)) for name, form in plan.effects]
-    if plan.kind is not None:
-        effects = [unlisted(plan.kind, rng, c, max(lengths))]
+    effects += [discoverable(kind, rng, c, max(lengths)) for kind in plan.kinds]
     names = specimens(len(lengths), fault, bool(rng.random() < 0.5), rng)
+    if plan.rich and "scatter" in fault.parts:
+        names = rich_specimens(len(lengths), held)
     weight = density * GRAVITY * 1e-9
     made = StripDraft(
-        c, weight, lengths, at, effects, holdout, 1.0, fault, names, {}, [], True, density
+        c, weight, lengths, at, effects, held, 1.0, fault, names, {}, [], True, density
     )
-    fitted = [n for n in range(len(lengths)) if n != holdout]
+    fitted = [n for n in range(len(lengths)) if n not in held]
     heights = [made.hang(lengths[n], at[n])[1] for n in fitted]
     fits = Fits(c, weight, [lengths[n] for n in fitted], [at[n] for n in fitted], heights)
     made.accept = [frozenset(name for name, _ in plan.effects)]
@@ -115,6 +132,13 @@ def _draft(plan: StripPlan, fault: Fault, rng: Rng) -> StripDraft:
     base = fits.left([])
     made.sigma = base / float(rng.uniform(*plan.ratio))
     assess(plan, made, fits, base, fitted)
+    if len(plan.kinds) > 1:
+        for effect in effects:
+            alone = replace(made, effects=[effect])
+            heights = [alone.hang(lengths[n], at[n])[1] for n in fitted]
+            left = Fits(c, weight, fits.lengths, fits.at, heights).left([]) / made.sigma
+            made.fairness[f"alone: {effect.name}"] = round(left, 3)
+            made.fair = made.fair and left > 2.5
     return made
 
 
@@ -134,7 +158,14 @@ def assess(plan: StripPlan, made: StripDraft, fits: Fits, base: float, fitted: l
     near = [frozenset({name}) for name, left in singles.items() if left < LEFT]
     near = [key for key in near if not key <= names or len(names) > 1]
     made.fair = not near and made.sigma > 0.01 and (keys[0] == "A" == keys[-1] or own > LEFT)
-    if plan.kind is not None:
+    if plan.rich:
+        held = sorted(made.held)
+        lengths, at = [made.lengths[n] for n in held], [made.at[n] for n in held]
+        heights = [made.hang(*each)[1] for each in zip(lengths, at, strict=True)]
+        ahead = fits.foretold(Fits(made.c, made.weight, lengths, at, heights)) / made.sigma
+        made.fairness["held_out"] = round(ahead, 3)
+        made.fair = made.fair and ahead > LEFT
+    if plan.kinds:
         pairs = {key: left / made.sigma for key, left in fits.pairs(scattered).items()}
         more = [
             key
@@ -156,6 +187,24 @@ def assess(plan: StripPlan, made: StripDraft, fits: Fits, base: float, fitted: l
         made.accept = made.accept + near
 
 
+def other_terms(plan: StripPlan, made: StripDraft, known: bool) -> tuple[Term, ...]:
+    """The terms that the overhangs cannot tell from the true one, by own least squares."""
+    if not plan.rich or len(plan.kinds) != 1:
+        return ()
+    fitted = [n for n in range(len(made.lengths)) if n not in made.held]
+    lengths, at = [made.lengths[n] for n in fitted], [made.at[n] for n in fitted]
+    shapes = [made.hang(*each, cells=CELLS) for each in zip(lengths, at, strict=True)]
+    keys = [made.names[n] for n in fitted]
+    owners = [keys.index(key) if "scatter" in made.fault.parts else 0 for key in keys]
+    left, rows = strip_terms_left(
+        Overhangs(made.c, made.weight, lengths, at, shapes, owners, known)
+    )
+    rest = {words: value / made.sigma for words, value in left.items()}
+    order = sorted(rest, key=lambda words: rest[words])
+    made.fairness["terms"] = {words: round(rest[words], 3) for words in order[:4]}
+    return not_parted(rest, TERMS[plan.kinds[0]], rows)
+
+
 def strip_set(plan: StripPlan, rng: Rng) -> MeasurementSet:
     """A set of strips as planned."""
     return measure_strips(plan, strip_draft(plan, rng), rng)
@@ -165,7 +214,10 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
     """Measure a draft: specimens, noise, roles; and know how to measure one more overhang."""
     fault, sigma = made.fault, made.sigma
     rows = factors(made.names, 1, fault, rng)
-    known = plan.lengths is not None or bool(rng.random() < 0.75)
+    share = 0.75
+    if plan.rich:  # what acts on the reading is hard to know without the arc length
+        share = 0.85 if any(TERMS[kind][0].acts_on == "reading" for kind in plan.kinds) else 0.3
+    known = plan.lengths is not None or bool(rng.random() < share)
     noises: list[Array] = []
     shapes = [
         made.hang(length, at, float(row[0]))
@@ -189,7 +241,7 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
     runs = []
     for number, (length, at) in enumerate(zip(made.lengths, made.at, strict=True)):
         one = run(length, at, *shapes[number], rng)
-        one.role = "holdout" if number == made.holdout else "fit"
+        one.role = "holdout" if number in made.held else "fit"
         one.specimen = made.names[number]
         runs.append(one)
     separate = plan.lengths is not None or "scatter" in fault.parts or len(runs) <= 4
@@ -197,14 +249,17 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
         runs = _joined(runs)
     actual = rms(np.concatenate(noises))
     fabric, c1 = draw_tow(made, rng)
+    also = other_terms(plan, made, known)
     truth = Truth(
         tuple(effect.name for effect in made.effects),
         tuple(effect.form for effect in made.effects),
         made.accept,
-        plan.kind is not None,
+        bool(plan.kinds),
         (plan.effects[0][0], plan.rival) if plan.rival is not None else (),
         parameters=comparable(plan, made, c1),
         noise_rms=actual,
+        noise_held_out=rms(np.concatenate([noises[n] for n in sorted(made.held)])),
+        terms=tuple(TERMS[kind] + also for kind in plan.kinds if plan.rich),
         fairness={**made.fairness, "fair": made.fair},
     )
     more = np.random.default_rng(rng.integers(2**63))
@@ -237,7 +292,7 @@ def measure_strips(plan: StripPlan, made: StripDraft, rng: Rng) -> MeasurementSe
 def comparable(plan: StripPlan, made: StripDraft, c1: float) -> dict[str, float]:
     """The parameters that mean the same in every form of the effects in force."""
     names = {name for name, _ in plan.effects}
-    if plan.kind is not None or "nonlinear_bending" in names:
+    if plan.kinds or "nonlinear_bending" in names:
         return {}
     values = {"C1_MPa": c1}
     for effect in made.effects:

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
 import subprocess
 import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .families import FAMILIES, Job
+from .families import DISCOVERING, FAMILIES
+from .jobs import Job
 from .score import names_of, rivals_of, score, z_scores
-from .sets import MeasurementSet
+from .score_terms import discovered, score_terms
+from .sets import MeasurementSet, Term
 
 
 def default_command() -> str:
@@ -26,10 +30,21 @@ def default_command() -> str:
     return shlex.quote(str(beside)) if beside.exists() else "fabric-fenicsx"
 
 
+@dataclass
+class Outcome:
+    """Exit code, seconds (of the clock, of the processor), report, last line of the errors."""
+
+    code: int
+    seconds: float
+    cpu: float
+    report: dict[str, Any]
+    said: str
+
+
 def diagnose(
     made: MeasurementSet, command: str, specimens: bool, limit: float, keep: Path | None
-) -> tuple[int, float, dict[str, Any], str]:
-    """Exit code, seconds, report and last line of the errors of one diagnosis."""
+) -> Outcome:
+    """One diagnosis of a set by the command."""
     with tempfile.TemporaryDirectory() as scratch:
         root = Path(scratch)
         if keep is not None:
@@ -37,27 +52,48 @@ def diagnose(
         folder = made.write(root / "set", specimens)
         call = [*shlex.split(command), "diagnose", str(folder), "--out", str(root / "out")]
         start = time.perf_counter()
-        try:
-            done = subprocess.run(
-                [*call, "--quiet"], capture_output=True, text=True, timeout=limit, check=False
-            )
-            code, said = done.returncode, done.stderr.strip().splitlines()
-        except subprocess.TimeoutExpired:
-            code, said = 124, ["out of time"]
+        code, cpu, said = timed([*call, "--quiet"], limit, root / "stderr")
         spent = time.perf_counter() - start
         path = root / "out" / "report.json"
         report = json.loads(path.read_text()) if code == 0 and path.exists() else {}
-        return code, spent, report, said[-1] if said else ""
+        return Outcome(code, spent, cpu, report, said)
+
+
+def timed(call: list[str], limit: float, errors: Path) -> tuple[int, float, str]:
+    """Exit code, seconds of processor time and last line of the errors of a program.
+
+    A program that is not done within ``limit`` seconds is ended, and its exit code is 124.
+    """
+    with errors.open("w") as stream:
+        started = subprocess.Popen(call, stdout=subprocess.DEVNULL, stderr=stream)
+        ends, late = time.monotonic() + limit, False
+        while True:
+            done, status, used = os.wait4(started.pid, os.WNOHANG)
+            if done:
+                break
+            if not late and time.monotonic() > ends:
+                late = True
+                started.kill()
+            time.sleep(0.05)
+    started.returncode = code = os.waitstatus_to_exitcode(status)
+    lines = errors.read_text(errors="replace").strip().splitlines()
+    said = "out of time" if late else lines[-1] if lines else ""
+    return 124 if late else code, used.ru_utime + used.ru_stime, said
+
+
+def as_entry(term: Term) -> dict[str, Any]:
+    """A term as the contract writes it."""
+    return {"acts_on": term.acts_on, "depends_on": sorted(term.depends_on)}
 
 
 def record(
     made: MeasurementSet,
     seed: int,
-    outcome: tuple[int, float, dict[str, Any], str],
+    outcome: Outcome,
     advised: bool = False,
 ) -> dict[str, Any]:
     """One line of the results."""
-    code, spent, report, said = outcome
+    report = outcome.report
     error = report.get("error") or {}
     line: dict[str, Any] = {
         "family": made.family + (" advised" if advised else ""),
@@ -72,13 +108,17 @@ def record(
         "fairness": made.truth.fairness,
         "keyed": any(run.specimen for run in made.runs),
         "stated": bool(made.noise),
-        "code": code,
-        "seconds": round(spent, 1),
-        "stderr": said,
+        "code": outcome.code,
+        "seconds": round(outcome.seconds, 1),
+        "cpu_seconds": round(outcome.cpu, 1),
+        "stderr": outcome.said,
         "noise_true": made.truth.noise_rms,
     }
+    if made.family in DISCOVERING:
+        line["asked"] = [[as_entry(term) for term in right] for right in made.truth.terms]
+        line["terms"] = asdict(score_terms(made, report))
     if not report:
-        return {**line, "right": False, "reason": f"exit {code}", "false_names": []}
+        return {**line, "right": False, "reason": f"exit {outcome.code}", "false_names": []}
     scored = score(made, report, advised)
     return {
         **line,
@@ -89,8 +129,8 @@ def record(
         "after": error.get("after"),
         "noise": error.get("noise"),
         "discovered": [
-            {key: term.get(key) for key in ("acts_on", "depends_on")}
-            for term in report.get("discovered") or []
+            {**as_entry(found), "rivals": [as_entry(rival) for rival in rivals]}
+            for found, *rivals in discovered(report)
         ],
         "z": z_scores(made, report),
         "right": scored.right,
@@ -129,7 +169,7 @@ def work(job: Job, seed: int, args: argparse.Namespace) -> list[dict[str, Any]]:
     outcome = diagnose(made, *options)
     lines = [record(made, seed, outcome)]
     if made.advice is not None and made.further is not None and not args.no_advice:
-        theirs = None if args.own_advice else advice_of(outcome[2].get("next_tests"), made.test)
+        theirs = None if args.own_advice else advice_of(outcome.report.get("next_tests"), made.test)
         more = made.with_run(made.further(made.advice if theirs is None else theirs))
         more.name = made.name + ", advised"
         lines.append(record(more, seed, diagnose(more, *options), advised=True))
@@ -187,9 +227,9 @@ def main(argv: list[str] | None = None) -> int:
                 print(seed, name, problem, flush=True)
                 continue
             fair = made.truth.fairness
-            print(
-                seed, name, len(made.runs), [sorted(a) for a in made.truth.accept], fair, flush=True
-            )
+            accept = [sorted(names) for names in made.truth.accept]
+            asked = [" | ".join(map(str, right)) for right in made.truth.terms]
+            print(seed, name, len(made.runs), accept, asked, fair, flush=True)
         return 0
     with ThreadPoolExecutor(args.jobs) as pool, Path(args.out).open("a") as stream:
         for lines in pool.map(lambda item: work(item[0], item[1], args), todo):

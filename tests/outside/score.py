@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from .score_terms import TermScore, score_terms
 from .sets import MeasurementSet
 
 
@@ -41,6 +42,10 @@ def score(made: MeasurementSet, report: dict[str, Any], advised: bool = False) -
     false = sorted(given - fine)
     if truth.rivals:
         return _of_rivals(made, verdict, given, rivals_of(report), false, advised)
+    if truth.terms:
+        return _of_terms(made, verdict, given, score_terms(made, report))
+    if report.get("discovered") and not truth.unlisted:
+        return Score(False, "a discovered term where there is none", false)
     if truth.unlisted:
         if verdict in ("unexplained", "effect_discovered"):
             return Score(True, verdict, [])
@@ -66,6 +71,21 @@ def score(made: MeasurementSet, report: dict[str, Any], advised: bool = False) -
     if given & true:
         return Score(False, "one right and one wrong", sorted(given - true))
     return Score(False, "another name", sorted(given - true))
+
+
+def _of_terms(made: MeasurementSet, verdict: str, given: frozenset[str], terms: TermScore) -> Score:
+    """The score of a set whose effects are to be discovered."""
+    if verdict == "effect_found" and given in made.truth.accept:
+        return Score(True, "imitated within the noise", [])
+    if terms.wrong_names:
+        return Score(False, "a listed name for an unlisted effect", terms.wrong_names)
+    if verdict != "effect_discovered":
+        return Score(False, "missed" if verdict == "no_effect" else verdict, [])
+    if not terms.variables:
+        return Score(False, "another term", [])
+    if not terms.error_right:
+        return Score(False, "the held-out runs are not foretold", [])
+    return Score(True, "discovered", [])
 
 
 def _of_rivals(

@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 DIGITS = {"time_s": 7, "displacement_mm": 6, "force_N": 7, "length_mm": 3, "s_mm": 4}
 
 
+UNDECIDED = 10.0  # a difference of log-likelihoods that decides nothing
+
+
 @dataclass
 class Run:
     """One CSV file: its columns by name, its role and the specimen it was measured on."""
@@ -27,6 +30,34 @@ class Run:
     label: str = ""
 
 
+@dataclass(frozen=True)
+class Term:
+    """What a term acts on and the variables it depends on, in the words of the contract."""
+
+    acts_on: str
+    depends_on: frozenset[str]
+
+    def __str__(self) -> str:
+        return f"{self.acts_on}: {' '.join(sorted(self.depends_on))}"
+
+
+def terms(text: str) -> tuple[Term, ...]:
+    """Terms written as ``moment: rate path | travel: force``; the first is the truth."""
+    parts = (part.split(":") for part in text.split("|"))
+    return tuple(Term(acts.strip(), frozenset(on.split())) for acts, on in parts)
+
+
+def not_parted(left: dict[str, float], right: tuple[Term, ...], rows: int) -> tuple[Term, ...]:
+    """The terms of no more variables that leave too little to be told from the true one.
+
+    ``left`` is in units of the noise; ``rows`` is the number of fitted readings.
+    """
+    limit = np.sqrt(2 * UNDECIDED / rows)
+    most = len(right[0].depends_on)
+    near = [term for words, rest in left.items() if rest < limit for term in terms(words)]
+    return tuple(term for term in near if term not in right and len(term.depends_on) <= most)
+
+
 @dataclass
 class Truth:
     """What is known of a set, and which answers are right.
@@ -35,6 +66,8 @@ class Truth:
     ``unlisted`` says that ``unexplained`` and ``effect_discovered`` are right.
     ``rivals`` are pairs of which one is to be named with the other among its rivals.
     ``fairness`` holds residuals over the noise: of the baseline, of each listed effect, ...
+    ``terms`` has, for each effect that is to be discovered, what it is and what else is right.
+    ``noise_held_out`` is the noise of the held-out readings alone.
     """
 
     effects: tuple[str, ...] = ()
@@ -44,6 +77,8 @@ class Truth:
     rivals: tuple[str, ...] = ()
     parameters: dict[str, float] = field(default_factory=dict)
     noise_rms: float = 0.0
+    noise_held_out: float = 0.0
+    terms: tuple[tuple[Term, ...], ...] = ()
     fairness: dict[str, Any] = field(default_factory=dict)
 
 

@@ -15,7 +15,7 @@ from .strip import Law, Strip
 
 Rng = np.random.Generator
 Change = Callable[[Strip], None]
-Camera = Callable[[Array, Array], tuple[Array, Array]]
+Camera = Callable[[Array, Array, float], tuple[Array, Array]]
 
 
 @dataclass
@@ -30,7 +30,7 @@ class StripEffect:
     known: dict[str, float] = field(default_factory=dict)  # parameters that a report may name
 
 
-def softening(bend: float, left: float) -> Law:
+def softening(bend: float, left: float | Array) -> Law:
     """Bending that softens by tanh to a share of its stiffness."""
 
     def law(k: Array) -> tuple[Array, Array]:
@@ -181,11 +181,11 @@ def unlisted(kind: str, rng: Rng, c: float, longest: float) -> StripEffect:
     if kind == "clamp whose edge is worn":
         return StripEffect(kind, kind, inside=0.15 * size * c)
     cameras: dict[str, Camera] = {
-        "perspective of the camera": lambda x, z: (x, z * (1 + 0.3 * size * x / longest)),
-        "barrel of the lens": lambda x, z: (
+        "perspective of the camera": lambda x, z, length: (x, z * (1 + 0.3 * size * x / longest)),
+        "barrel of the lens": lambda x, z, length: (
             x * (1 - 0.12 * size * (x**2 + z**2) / longest**2),
             z * (1 - 0.3 * size * (x**2 + z**2) / longest**2),
         ),
-        "unequal scales of the picture": lambda x, z: (x, z * (1 + 0.1 * size)),
+        "unequal scales of the picture": lambda x, z, length: (x, z * (1 + 0.1 * size)),
     }
     return StripEffect(kind, kind, camera=cameras[kind])

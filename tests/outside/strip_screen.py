@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
+from .screen import rms
 from .sets import Array
 from .strip import Strip
 from .strip_effects import power_law, softening, stiffening
@@ -60,29 +61,41 @@ class Fits:
         self.c, self.weight, self.lengths, self.at = c, weight, lengths, at
         self.data = np.concatenate(heights)
 
+    def misfit(
+        self, p: Array, makes: Sequence[tuple[Make, list[float]]], owners: Sequence[int]
+    ) -> Array:
+        """Heights less the data: log factors on the stiffness first, then what effects take."""
+        ids = sorted(set(owners))
+        parts = []
+        for length, at, owner in zip(self.lengths, self.at, owners, strict=True):
+            factor = float(np.exp(np.clip(p[ids.index(owner)], -4, 4)))
+            strip = Strip(self.weight * self.c**3 * factor, self.weight, length, cells=CELLS)
+            place = len(ids)
+            for make, values in makes:
+                make(strip, [float(v) for v in p[place : place + len(values)]], self.c)
+                place += len(values)
+            try:
+                parts.append(strip.shape(at)[2])
+            except (ArithmeticError, ValueError):
+                parts.append(np.full(len(at), 1e3))
+        return np.concatenate(parts) - self.data
+
+    def _found(
+        self, makes: Sequence[tuple[Make, list[float]]], owners: list[int] | None
+    ) -> OptimizeResult:
+        group = owners or [0] * len(self.lengths)
+        start = [0.0] * len(set(group)) + [value for _, values in makes for value in values]
+        return least_squares(
+            self.misfit, start, diff_step=1e-5, max_nfev=25, x_scale=0.1, args=(makes, group)
+        )
+
     def left(self, makes: list[tuple[Make, list[float]]], owners: list[int] | None = None) -> float:
         """The rms that the best fit leaves."""
-        group = owners or [0] * len(self.lengths)
-        ids = sorted(set(group))
-        start = [0.0] * len(ids) + [value for _, values in makes for value in values]
+        return rms(self._found(makes, owners).fun)
 
-        def residual(p: Array) -> Array:
-            parts = []
-            for length, at, owner in zip(self.lengths, self.at, group, strict=True):
-                factor = float(np.exp(np.clip(p[ids.index(owner)], -4, 4)))
-                strip = Strip(self.weight * self.c**3 * factor, self.weight, length, cells=CELLS)
-                place = len(ids)
-                for make, values in makes:
-                    make(strip, [float(v) for v in p[place : place + len(values)]], self.c)
-                    place += len(values)
-                try:
-                    parts.append(strip.shape(at)[2])
-                except (ArithmeticError, ValueError):
-                    parts.append(np.full(len(at), 1e3))
-            return np.concatenate(parts) - self.data
-
-        found = least_squares(residual, start, diff_step=1e-5, max_nfev=25, x_scale=0.1)
-        return float(np.sqrt(np.mean(found.fun**2)))
+    def foretold(self, ahead: Fits) -> float:
+        """The rms that the baseline fitted to these strips leaves of others."""
+        return rms(ahead.misfit(self._found([], None).x, [], [0] * len(ahead.lengths)))
 
     def singles(self, owners: list[int] | None) -> dict[str, float]:
         """What the best form of each listed effect leaves."""

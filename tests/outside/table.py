@@ -11,13 +11,19 @@ from typing import Any
 
 import numpy as np
 
+from .table_terms import table_terms
+
 Line = dict[str, Any]
 
 
 def held_out(line: Line) -> float | None:
     """The held-out error over the true noise, where something was found or nothing was there."""
     after = (line.get("after") or {}).get("holdout")
-    if after is None or line.get("verdict") not in ("no_effect", "effect_found"):
+    if after is None or line.get("verdict") not in (
+        "no_effect",
+        "effect_found",
+        "effect_discovered",
+    ):
         return None
     return float(after) / float(line["noise_true"])
 
@@ -38,7 +44,7 @@ def row(title: str, fault: str, lines: list[Line]) -> str:
     share = f"{np.mean(np.abs(z) < 2):.0%} of {len(z)}" if z else "-"
     errors = [error for error in map(held_out, lines) if error is not None]
     error_text = f"{np.median(errors):.2f}, {max(errors):.2f}" if errors else "-"
-    seconds = [line["seconds"] for line in lines]
+    seconds = [float(line.get("cpu_seconds") or line["seconds"]) for line in lines]
     names = ", ".join(f"{name} {count}" for name, count in false.most_common()) or "-"
     return (
         f"| {title} | {fault} | {right}/{len(lines)} | {unfair} | {names} | {share} | {error_text}"
@@ -77,7 +83,8 @@ def table(lines: list[Line]) -> str:
                 f"| {line['family']}: {line['set']} | {line['seed']} | {truth or 'nothing'} |"
                 f" {textbook(line)} | {answer} | {line['reason']} |"
             )
-    return "\n".join(out)
+    terms = table_terms(scored)
+    return "\n".join([*out, "", terms] if terms else out)
 
 
 OPENING = """# The loop on an outsider's sets
