@@ -74,7 +74,9 @@ def test_the_report_keeps_the_contract(diagnosed, name):
         assert isinstance(effect["rivals"], list)
     listed = "crossover_friction crossover_relaxation rate_hardening shear_locking"
     listed += " tension_coupling crosshead_backlash load_drift"
-    assert {c["name"] for c in report["candidates"]} == set(listed.split())
+    names = {c["name"] for c in report["candidates"]}
+    # Where nothing listed will do, terms without a formula were tried as well.
+    assert names > set(listed.split()) if verdict == "unexplained" else names == set(listed.split())
     for candidate in report["candidates"]:
         assert {"score", "p_value", "error_fit", "error_holdout"} < set(candidate)
         assert 0.0 <= candidate["p_value"] <= 1.0
@@ -129,13 +131,12 @@ def test_the_criterion_is_that_of_the_chosen(diagnosed):
 
 
 def test_the_unexplained_says_what_came_nearest(diagnosed, tmp_path):
-    """To wrinkles an even force; to a vibration nothing, as no effect makes it likelier than none.
+    """To wrinkles an even force; to a vibration of less than two readings a cycle nothing is near.
 
     What comes and goes within a few readings is noise beside the model, but not white.
     """
     report = report_of(diagnosed["unlisted-vibration"][1])
-    assert report["best"] is None
-    assert report["whiteness"]["after"]["period"] < 1e-10
+    assert report["discovered"] == [] and report["whiteness"]["after"]["period"] < 1e-10
     RECIPES["unlisted-wrinkles"](tmp_path / "set")
     only = ["--effects", "tension_coupling,load_drift", "--quiet"]
     assert command("diagnose", tmp_path / "set", "--out", tmp_path / "out", *only) == 0

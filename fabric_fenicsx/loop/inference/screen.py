@@ -34,6 +34,8 @@ Signatures = Mapping[Effect, Mapping[Variant, Sequence[Signature]]]
 LEFT = 1e-7
 #: Pairs that triples are looked for from, and pairs of one kind that are kept.
 BEST_PAIRS, FORMS = 12, 3
+#: Shapes of an effect that pairs are made of, those that take most off by themselves.
+MOST_SHAPES = 60
 #: Times that amplitudes of the wrong sign are taken out.
 SIGNS = 3
 
@@ -149,8 +151,11 @@ class Screen:
 
     def _pairs(self) -> list[tuple[_Group, ...]]:
         by_effect: dict[Effect, list[_Group]] = {}
-        for group in self._groups:
-            by_effect.setdefault(group.effect, []).append(group)
+        gains = self._gains([(g,) for g in self._groups])
+        for k in np.argsort(-gains, kind="stable"):
+            own = by_effect.setdefault(self._groups[k].effect, [])
+            if len(own) < MOST_SHAPES:
+                own.append(self._groups[k])
         pairs = combinations(by_effect.values(), 2)
         found = [both for a, b in pairs for both in product(a, b)]
         return [both for both in found if _compatible(both)]

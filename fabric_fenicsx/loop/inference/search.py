@@ -70,7 +70,12 @@ def diagnose_test(
     if search.accounted or found.curve is not None or names is not None:
         return found
     # Nothing that has a name will do: what acts on what, and by what does it go?
-    return _Search(experiment, [*listed, *experiment.terms], progress).run()
+    further = _Search(experiment, [*listed, *experiment.terms], progress).run()
+    known = {c.effect: c for c in found.candidates}
+    further.candidates = [
+        known[c.effect] if c.fit is None and c.effect in known else c for c in further.candidates
+    ]
+    return further
 
 
 class _Search:

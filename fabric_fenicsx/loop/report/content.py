@@ -68,6 +68,7 @@ def test_report(
                 "criterion": c.criterion,
             }
             for c in d.candidates
+            if c.effect.listed or c.fit is not None
         ],
         "criterion": {"before": d.criterion_before, "after": d.criterion_after},
         "baseline": {"parameters": d.baseline.values, "std": _std(d, d.baseline)},

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
+import numpy as np
 from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
@@ -31,8 +32,9 @@ BENDS = (0.01, 0.1)
 MEMORIES = (0.01, 0.05, 0.2)
 #: Angles in which a friction begins to slide [rad].
 STICKS = (0.005, 0.03)
-#: Periods, as shares of the range, that a periodic term is looked for with.
-PERIODS = tuple(1.0 / (1.5 + 0.5 * k) for k in range(30))
+#: Most cycles over the range that a periodic term is looked for with, and their step: closer
+#: together two waves over the range are alike.
+CYCLES, STEP = {"time": 40.0, "displacement": 16.0}, 0.5
 #: Share of the largest speed below which its sign is rounded.
 SLOW = 1e-3
 
@@ -250,5 +252,7 @@ def _added(name: str, variable: str) -> Iterator[tuple[str, dict[str, Any]]]:
         yield label, numbers | {"coefficients": coefficients}
     if variable in ("time", "displacement"):
         waves = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))
-        period = Parameter(f"{name}_period", PERIODS, 0.5 * min(PERIODS), 1.0)
+        most = CYCLES[variable]
+        periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
+        period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
         yield "periodic", {"shape": "periodic", "coefficients": waves, "width": period}
