@@ -163,12 +163,14 @@ def _shortest(table: pd.DataFrame) -> str:
         for guess in formula.starts:
             scaled = (guess[0] * (own[-1] - start or size), *guess[1:])
             try:
-                found, _ = curve_fit(
-                    formula.value, x, own - start, scaled, sigma=allowed, maxfev=500
-                )
+                with np.errstate(all="ignore"):
+                    found, _ = curve_fit(
+                        formula.value, x, own - start, scaled, sigma=allowed, maxfev=500
+                    )
             except (RuntimeError, ValueError, FloatingPointError):
                 continue
-            off = float(np.max(np.abs(formula.value(x, *found) - own + start) / allowed))
+            with np.errstate(all="ignore"):
+                off = float(np.max(np.abs(formula.value(x, *found) - own + start) / allowed))
             text = formula.text(*found)
             if off <= 1.0 and (best is None or (len(found), off) < best[:2]):
                 best = (len(found), off, text)

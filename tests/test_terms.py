@@ -1,0 +1,263 @@
+"""Terms without a formula: what they depend on, what they are in a net, and that they are found."""
+
+import math
+
+import numpy as np
+import pytest
+from ufl import as_ufl
+
+from fabric_fenicsx.inputs.python_file import classes_of, run_file
+from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
+from fabric_fenicsx.loop.kinds.picture_frame.terms import terms
+from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw
+from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw, shape_of
+
+STEP = 0.5
+RANGES = {
+    "angle": 0.6,
+    "rate": 0.05,
+    "path": 3.0,
+    "time": 100.0,
+    "displacement": 40.0,
+    "speed": 1.0,
+    "acceleration": 0.1,
+    "force": 5.0,
+    "force_rate": 0.1,
+}
+
+
+def marched(law, gammas, rate=None):
+    """Moments and variables of a law over equal steps of time."""
+    memory, before, found = {}, 0.0, []
+    for gamma in gammas:
+        at = Crossing(
+            gamma=as_ufl(float(gamma)),
+            gamma_n=as_ufl(before),
+            per_time=as_ufl(1.0 / STEP),
+            number=lambda value: as_ufl(value) if np.isscalar(value) else value,
+            past=lambda name, memory=memory: as_ufl(memory.get(name, 0.0)),
+        )
+        found.append((float(law.moment(at)), float(law.variable_at(at))))
+        memory = {name: float(value) for name, value in law.history(at).items()}
+        before = float(gamma)
+    return np.array(found).T
+
+
+PATH = [0.1, 0.3, 0.3, 0.2, -0.1, 0.4]
+
+
+@pytest.mark.parametrize(
+    ("variable", "expected"),
+    [
+        ("angle", [0.1, 0.3, 0.3, 0.2, 0.1, 0.4]),
+        ("largest_angle", [0.1, 0.3, 0.3, 0.3, 0.3, 0.4]),
+        ("path", [0.1, 0.3, 0.3, 0.4, 0.7, 1.2]),
+        ("time", [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]),
+        ("rate", [0.2, 0.4, 0.0, 0.2, 0.6, 1.0]),
+        # A hold goes on as the motion before it; 0.2 to -0.1 is a way down in size.
+        ("unloading", [0.0, 0.0, 0.0, 1.0, 1.0, 0.0]),
+    ],
+)
+def test_what_a_factor_depends_on(variable, expected):
+    law = ShapedLaw("odd", variable, reach=10.0, coefficients=(1.0,))
+    assert marched(law, PATH)[1] == pytest.approx(expected)
+
+
+def test_memories_fade():
+    """After a step the mean goes as 1 − e^(−t/τ), a largest value afterwards as e^(−t/τ)."""
+    held = np.full(8, 0.3)
+    t = STEP * np.arange(1, 9)
+    mean = ShapedLaw("odd", "recent_angle", reach=1.0, coefficients=(1.0,), memory=2.0)
+    assert marched(mean, held)[1] == pytest.approx(0.3 * (1.0 - np.exp(-t / 2.0)))
+    largest = ShapedLaw("odd", "recent_largest_angle", reach=1.0, coefficients=(1.0,), memory=2.0)
+    back = np.concatenate([[0.3], np.zeros(7)])
+    assert marched(largest, back)[1] == pytest.approx(0.3 * np.exp(-(t - STEP) / 2.0))
+
+
+@pytest.mark.parametrize(
+    ("kind", "coefficients", "numbers"),
+    [
+        ("spline", (0.3, -1.0, 2.0, 0.7, -3.0), {}),
+        ("step", (0.7,), {"place": 0.4, "width": 0.05}),
+        ("saturation", (0.7,), {"width": 0.2}),
+        ("logarithm", (0.7,), {"width": 0.05}),
+        ("periodic", (0.4, -0.6), {"width": 0.3}),
+        ("sign", (0.4,), {"width": 1e-3}),
+    ],
+)
+def test_shapes_begin_at_nothing_and_are_smooth(kind, coefficients, numbers):
+    """No jump of value or slope, at the knots of the spline neither."""
+
+    def f(x):
+        return float(as_ufl(shape_of(kind, coefficients, as_ufl(x), **numbers)))
+
+    assert f(0.0) == pytest.approx(0.0, abs=1e-15)
+    h = 1e-7
+    for knot in (0.25, 0.5, 0.75):
+        below, above = (f(knot) - f(knot - h)) / h, (f(knot + h) - f(knot)) / h
+        assert above == pytest.approx(below, rel=1e-3, abs=1e-4)
+
+
+def test_beyond_what_was_seen_a_factor_stays_as_it_is():
+    law = ShapedLaw("even", "angle", reach=0.3, coefficients=(2.0, 1.0))
+    moments = marched(law, [0.3, 0.5, 0.9])[0]
+    assert moments == pytest.approx([3.0, 3.0, 3.0])
+
+
+def test_bases():
+    """Of a factor of one: k₁ γ + k₃ γ³, γ̇, a friction that sticks over an angle, signs."""
+    one = {"variable": "angle", "reach": 1.0, "coefficients": (0.0,), "constant": 1.0}
+    gamma, change = np.array(PATH), np.diff(PATH, prepend=0.0)
+    expected = {
+        "elastic": 2.0 * gamma + 5.0 * gamma**3,
+        "viscous": change / STEP,
+        "odd": np.sign(gamma),
+        "even": np.ones(6),
+        "odd_in_rate": [1.0, 1.0, 1.0, -1.0, -1.0, 1.0],
+        "dissipative": [0.5, 1.0, 1.0, 0.5, -1.0, 1.0],
+    }
+    for base, moments in expected.items():
+        law = ShapedLaw(base, **one, k1=2.0, k3=5.0, stick_angle=0.2)
+        assert marched(law, PATH)[0] == pytest.approx(moments), base
+
+
+def test_terms_cover_the_contract():
+    """What acts, and what it depends on, as the table of a report's `discovered` allows."""
+    allowed = {
+        "moment": "angle rate direction largest_angle path time history run",
+        "reading": "displacement force rate acceleration time run",
+        "travel": "displacement force time direction run",
+    }
+    found = {}
+    for term in terms(RANGES):
+        assert set(term.depends_on) <= set(allowed[term.acts_on].split())
+        found.setdefault(term.acts_on, set()).update(term.depends_on)
+        names = [p.name for v in term.variants for p in v.parameters]
+        assert all(name.startswith(term.name) for name in names)
+    for acts_on, variables in found.items():
+        assert variables >= set(allowed[acts_on].split()) - {"run"}, acts_on
+
+
+# A frame with a spring that wears: made up without the package's laws. -------------------------
+
+FRAME, FABRIC, K1, K3, C1, NOISE = 200.0, 100.0, 0.05, 0.3, 0.02, 0.05
+
+
+def travels(*corners):
+    """Readings each second along straight ways between these angles [rad]."""
+    gamma = np.interp(
+        np.arange(0.0, 40.0 * (len(corners) - 1) + 1.0), 40.0 * np.arange(len(corners)), corners
+    )
+    theta = np.pi / 4 - gamma / 2
+    return gamma, FRAME * (2 * np.cos(theta) - math.sqrt(2.0))
+
+
+def write(folder, wear):
+    """Two fitted runs and one held out; of the elastic moment, wear (1 − e^(−path/0.6)) is lost."""
+    folder.mkdir(parents=True)
+    rng = np.random.default_rng(5)
+    runs = {
+        "a": (0.0, 0.5, 0.0, 0.5, 0.0),
+        "b": (0.0, 0.3, 0.1, 0.5, 0.0, 0.4),
+        "c": (0.0, 0.4, 0.0, 0.45),
+    }
+    lines = []
+    for name, corners in runs.items():
+        gamma, D = travels(*corners)
+        time = np.arange(len(gamma), dtype=float)
+        rate = np.gradient(gamma)
+        path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(gamma)))])
+        m = (K1 * gamma + K3 * gamma**3) * (1.0 - wear * (1.0 - np.exp(-path / 0.6))) + C1 * rate
+        force = m * FABRIC**2 / (FRAME * np.sin(np.pi / 4 - gamma / 2))
+        force = force + NOISE * rng.standard_normal(len(force))
+        table = np.column_stack([time, D, force])
+        head = "time_s,displacement_mm,force_N"
+        np.savetxt(folder / f"{name}.csv", table, "%.8g", ",", header=head, comments="")
+        role = "holdout" if name == "c" else "fit"
+        lines.append(f"- {{file: {name}.csv, role: {role}, specimen: S}}\n")
+    (folder / "measurement.yaml").write_text(
+        "schema: fabric-measurement/1\ntest: picture_frame\ntitle: a spring that wears\n"
+        "fabric: {areal_density_kg_m2: 0.2, tow_spacing_mm: 5}\n"
+        f"rig: {{frame_length_mm: {FRAME}, fabric_length_mm: {FABRIC}}}\n"
+        f"noise: {{force_N: {NOISE}}}\nruns:\n" + "".join(lines)
+    )
+    return folder
+
+
+@pytest.fixture(scope="module")
+def worn(tmp_path_factory):
+    """Report, and its folder, of a frame whose spring wears with the path."""
+    folder = tmp_path_factory.mktemp("worn")
+    out = folder / "out"
+    return diagnose([read_measurement(write(folder / "set", 0.5))], out), out
+
+
+def test_wear_is_discovered(worn):
+    found, _ = worn
+    report = found.report
+    assert report["verdict"] == "effect_discovered" and report["effects"] == []
+    (term,) = report["discovered"]
+    variables = [(term["acts_on"], term["depends_on"])]
+    variables += [(r.get("acts_on"), r.get("depends_on")) for r in term["rivals"]]
+    assert ("moment", ["path"]) in variables
+    error = report["error"]
+    assert error["before"]["holdout"] > 3.0 * NOISE > 2.0 * error["after"]["holdout"]
+
+
+def test_the_shape_is_the_one_put_in(worn):
+    """Within its band: a loss of 0.5 (1 − e^(−path/0.6)), of a spring that is fitted beside it."""
+    found, out = worn
+    x, y, std = np.loadtxt(out / "discovered_1.csv", delimiter=",", skiprows=1).T
+    truth = -0.5 * (1.0 - np.exp(-x / 0.6))
+    if found.report["discovered"][0]["depends_on"] == ["path"]:
+        assert np.all(np.abs(y - truth) < 4.0 * std + 0.02)
+
+
+def test_the_page_shows_the_discovery(worn):
+    found, out = worn
+    page = (out / "report.html").read_text()
+    (term,) = found.report["discovered"]
+    assert "discovered_1.py" in page and "picture_frame_discovered_1.png" in {
+        p.name for p in out.iterdir()
+    }
+    assert term["formula"].split("(")[0].strip() in page
+
+
+def test_the_file_is_the_term(worn, tmp_path):
+    """As an effect it is found again, once; as a law of a case it has the loop's moments."""
+    found, out = worn
+    again = diagnose(
+        [read_measurement(write(tmp_path / "set", 0.5))], effects_from=out / "discovered_1.py"
+    ).report
+    assert again["verdict"] == "effect_found"
+    (effect,) = again["effects"]
+    assert effect["name"] == "discovered_1"
+    assert effect["parameters"]["discovered_1_amount"] == pytest.approx(1.0, abs=0.02)
+    (own,) = classes_of(run_file(out / "discovered_1.py", "law"), CrossingLaw)
+    term = next(e for e in found.diagnoses[0].effects if not e.listed)
+    variant = next(v for v in found.diagnoses[0].final.variants if v in term.variants)
+    (law,) = variant.laws(found.diagnoses[0].final.values)
+    area = 25.0
+    gammas = np.interp(np.linspace(0.0, 1.0, 40), [0.0, 0.4, 0.7, 1.0], [0.0, 0.5, 0.1, 0.6])
+    memory, before = ({}, {}), 0.0
+    for gamma in gammas:
+        values = []
+        for k, one in enumerate((own.of_case({"amount": 1.0}, area), law)):
+            at = Crossing(
+                as_ufl(float(gamma)),
+                as_ufl(float(before)),
+                as_ufl(2.0),
+                lambda value: as_ufl(value) if np.isscalar(value) else value,
+                lambda name, k=k: as_ufl(memory[k].get(name, 0.0)),
+            )
+            values.append(float(as_ufl(one.moment(at))))
+            new = {name: float(as_ufl(value)) for name, value in one.history(at).items()}
+            memory[k].clear()
+            memory[k].update(new)
+        assert values[0] == pytest.approx(area * values[1], rel=1e-9, abs=1e-12)
+        before = gamma
+
+
+def test_where_nothing_wears_nothing_is_discovered(tmp_path):
+    report = diagnose([read_measurement(write(tmp_path / "set", 0.0))]).report
+    assert report["verdict"] == "no_effect" and report["discovered"] == []
