@@ -183,6 +183,8 @@ def test_doubts_name_what_is_not_plausible():
 
 REPORT = {
     "verdict": "no_effect",
+    "discovered": [],
+    "beside": [],
     "error": {
         "quantity": "force_N",
         "before": {"fit": 0.05, "holdout": 0.05},

@@ -74,9 +74,15 @@ def test_an_effect_of_ones_own_is_found_where_no_other_explains(tmp_path):
     # Ten times as strong as it need be to be seen: a weaker one, a pair of the known imitates.
     made = tmp_path / "made"
     own = ["--effects-from", OWN]
-    assert synthesise(made, "--effect", "stitch_tightening:m_s_N=0.136", *own, "--quiet") == 0
+    hidden = ["--effect", "stitch_tightening:m_s_N=0.136", "--readings", 60]
+    assert synthesise(made, *hidden, *own, "--quiet") == 0
     assert command("diagnose", made, "--out", tmp_path / "without", "--quiet") == 0
-    assert report_of(tmp_path / "without")["verdict"] == "unexplained"
+    report = report_of(tmp_path / "without")
+    assert report["verdict"] == "effect_discovered"
+    (term,) = report["discovered"]
+    # In a frame a moment by the angle is a reading by the displacement.
+    found = [(one.get("acts_on"), one.get("depends_on")) for one in (term, *term["rivals"])]
+    assert ("moment", ["angle"]) in found
     assert command("diagnose", made, "--out", tmp_path / "with", *own, "--quiet") == 0
     report = report_of(tmp_path / "with")
     assert "stitch_tightening" in [candidate["name"] for candidate in report["candidates"]]

@@ -78,6 +78,7 @@ def test_memories_fade():
     ("kind", "coefficients", "numbers"),
     [
         ("spline", (0.3, -1.0, 2.0, 0.7, -3.0), {}),
+        ("graded", (0.3, -1.0, 2.0, 0.7, -3.0, 1.0), {}),
         ("step", (0.7,), {"place": 0.4, "width": 0.05}),
         ("saturation", (0.7,), {"width": 0.2}),
         ("logarithm", (0.7,), {"width": 0.05}),
@@ -116,6 +117,10 @@ def test_bases():
         "odd_in_rate": [1.0, 1.0, 1.0, -1.0, -1.0, 1.0],
         "dissipative": [0.5, 1.0, 1.0, 0.5, -1.0, 1.0],
     }
+    smooth = [0.0]
+    for step in change / 0.2:
+        smooth.append(np.sign(step) + (smooth[-1] - np.sign(step)) * np.exp(-abs(step)))
+    expected["smooth"] = smooth[1:]
     for base, moments in expected.items():
         law = ShapedLaw(base, **one, k1=2.0, k3=5.0, stick_angle=0.2)
         assert marched(law, PATH)[0] == pytest.approx(moments), base

@@ -36,7 +36,8 @@ OPENING = """# The loop on made-up sets
 Picture frames and cantilevers made by a generator that shares no code with the package (closed
 forms and differential equations, `tests/measurements`), diagnosed one by one: every listed effect
 in several forms, pairs, none, effects on no list, rivals, outliers. An answer is right where the
-verdict is (of an effect on no list both that nothing explains it and that a term was discovered), and where each name is, itself or as a rival named with it. `before` and `after` are
+verdict is (of an effect on no list both that nothing explains it and that a term was discovered),
+and where each name is, itself or as a rival named with it. `before` and `after` are
 held-out errors over the noise put in; `expected` is what the fit itself expects of `after`, from
 the uncertainty of its parameters, where whole runs are held out. Written by
 `tests/measurements/table.py --page`.

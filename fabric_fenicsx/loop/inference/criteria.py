@@ -58,6 +58,8 @@ class Criteria:
         terms: that are fitted by themselves, of all effects and terms without a formula that are
             compared to first order; convention.
         most_terms: in one model, terms without a formula among them; convention.
+        as_little, without_formula: error over that of a term without a formula up to which
+            another term is its rival if it loses by so many times ``decisive``; convention.
         pairs: of rivals, for which a further test is looked for; convention.
         rounds: times that readings are left out, from ever better models; made-up.
         said_correlation: of neighbouring readings, above which the report names it; convention.
@@ -98,6 +100,8 @@ class Criteria:
     combinations: int = 6
     terms: int = 8
     most_terms: int = 2
+    as_little: float = 1.02
+    without_formula: float = 3.0
     pairs: int = 4
     rounds: int = 2
     said_correlation: float = 0.15

@@ -129,13 +129,14 @@ class Judge:
 
     # Comparison ---------------------------------------------------------------------------
 
-    def components(self, model: Fit, *, smooth: bool = False) -> Estimate:
-        """Variance components of a fitted model."""
+    def components(self, model: Fit, *, smooth: bool = False, thorough: bool = False) -> Estimate:
+        """Variance components of a fitted model; see estimate."""
         return estimate(
             linearised(self._experiment, model),
             model.variances,
             given=self.given,
             smooth=smooth,
+            thorough=thorough,
             usual_scatter=self._usual,
         )
 
@@ -148,9 +149,9 @@ class Judge:
             usual_scatter=self._usual,
         )
 
-    def weighed(self, model: Fit, effects: tuple[Effect, ...]) -> Model:
-        """A fitted model with its variance components and criterion."""
-        found = self.components(model)
+    def weighed(self, model: Fit, effects: tuple[Effect, ...], *, thorough: bool = False) -> Model:
+        """A fitted model with its variance components and criterion; see estimate."""
+        found = self.components(model, thorough=thorough)
         return Model(model, effects, found, found.likelihood + self.cost(model, effects))
 
     def cost(self, model: Fit, effects: tuple[Effect, ...]) -> float:

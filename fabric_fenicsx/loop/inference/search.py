@@ -67,13 +67,35 @@ def diagnose_test(
     listed = [e for e in experiment.effects if names is None or e.name in names]
     search = _Search(experiment, listed, progress)
     found = search.run()
-    if search.accounted or found.curve is not None or names is not None:
+    if names is not None or found.curve is not None or not experiment.terms:
         return found
-    # Nothing that has a name will do: what acts on what, and by what does it go?
-    further = _Search(experiment, [*listed, *experiment.terms], progress).run()
+    if not search.accounted:
+        # Nothing that has a name will do: what acts on what, and by what does it go?
+        return _beside(_Search(experiment, [*listed, *experiment.terms], progress).run(), found)
+    if search.effects_needed < 2:
+        return found
+    # Several effects with names may imitate a single one that has none.
+    single = _Search(experiment, experiment.terms, progress, most=1)
+    other = single.run()
+    if (
+        single.accounted
+        and single.effects_needed == 1
+        and other.criterion_after < found.criterion_after + CRITERIA.decisive
+    ):
+        if found.criterion_after < other.criterion_after + CRITERIA.decisive:
+            for names_of in other.rivals.values():
+                names_of += [effect.name for effect in found.effects]
+        return _beside(other, found)
+    return found
+
+
+def _beside(further: Diagnosis, found: Diagnosis) -> Diagnosis:
+    """A diagnosis with terms, with what was found of the listed effects by themselves."""
     known = {c.effect: c for c in found.candidates}
+    own = {c.effect for c in further.candidates if c.fit is not None}
     further.candidates = [
-        known[c.effect] if c.fit is None and c.effect in known else c for c in further.candidates
+        *(c for effect, c in known.items() if effect not in own),
+        *(c for c in further.candidates if c.fit is not None),
     ]
     return further
 
@@ -86,15 +108,18 @@ class _Search:
         experiment: Experiment,
         effects: Sequence[Effect],
         progress: Callable[[float, str], None],
+        most: int | None = None,
     ) -> None:
         self.experiment, self.progress = experiment, progress
-        self.effects = list(effects)
+        self.effects, self._most = list(effects), most
         # With what has no formula there are too many to fit them all.
         self._screened_first = any(not effect.listed for effect in effects)
         self.judge = Judge(experiment, self.effects)
         self._forms: dict[frozenset[Effect], list[Fit]] = {}
         #: Whether the chosen model leaves noise in the fitted readings; holdout runs have no say.
         self.accounted = False
+        #: How many effects it has.
+        self.effects_needed = 0
         self._start = {p.name: p.starts[0] for p in experiment.baseline}
         self.variances = self._first_variances()
         fitted = self._baseline(self._start)
@@ -147,6 +172,7 @@ class _Search:
         chosen = self._chosen(levels)
         verdict = self._verdict(baseline, chosen)
         self.accounted = self.judge.accounts(chosen, baseline)
+        self.effects_needed = len(chosen.effects)
         nearest = _nearest(levels)
         final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
         if final.effects:
@@ -225,7 +251,7 @@ class _Search:
             candidate.fit = mine[0].fit if mine else None
         most = min(CRITERIA.most_effects, max(2, len(self.experiment.effects) // 2))
         if self._screened_first:
-            most = CRITERIA.most_terms
+            most = self._most or CRITERIA.most_terms
         for count in range(2, 1 + min(most, len(self.effects))):
             best = _nearest(levels)
             if not levels[-1] or self.judge.settled(best, levels[0][0]):
@@ -370,7 +396,7 @@ class _Search:
             deviations=model.fit.deviations,
             evaluations=evaluations,
         )
-        return self.judge.weighed(found, model.effects)
+        return self.judge.weighed(found, model.effects, thorough=True)
 
     def _best_refined(self, models: list[Model]) -> list[Model]:
         """Models, the best first; the best of each set of effects was fitted again.
@@ -454,7 +480,6 @@ class _Search:
     def _rivals(self, final: Model, levels: Sequence[Sequence[Model]]) -> dict[str, list[str]]:
         """For each effect, the others that could take its place in the model."""
         found: dict[str, list[str]] = {}
-        limit = final.criterion + CRITERIA.decisive
         for own in final.effects:
             kept = [e for e in final.effects if e is not own]
             found[own.name] = []
@@ -466,9 +491,25 @@ class _Search:
                     known = self._best_refined(
                         self._weighed([(f, self._effects_of(f)) for f in fits])
                     )
-                if known and min(m.criterion for m in known) < limit:
+                best = min(known, key=lambda m: m.criterion, default=None)
+                if best is not None and self._near(best, final, own):
                     found[own.name].append(other.name)
         return found
+
+    def _near(self, model: Model, final: Model, own: Effect) -> bool:
+        """Whether the data do not decide against a model with another effect in an effect's place.
+
+        Shapes without a formula are not the law itself: where they leave as little, what they miss
+        of it may outweigh what the readings say.
+        """
+        loses = model.criterion - final.criterion
+        if own.listed or loses > REFINED_WITHIN:
+            return loses < CRITERIA.decisive
+        model = self._again(model, self.judge.averaged(model), CRITERIA.final_evaluations)
+        loses = model.criterion - final.criterion
+        mine, other = (m.fit.rms(m.fit.used) for m in (final, model))
+        alike = other < CRITERIA.as_little * mine
+        return loses < CRITERIA.decisive * (CRITERIA.without_formula if alike else 1.0)
 
     def _pairs(
         self, final: Model, rivals: Mapping[str, Sequence[str]], of_the_curve: Sequence[str]

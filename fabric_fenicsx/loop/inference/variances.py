@@ -37,6 +37,8 @@ Flags = npt.NDArray[np.bool_]
 
 #: Units in which variances are looked for: (a tenth)² of a parameter, (2 %)² of a reading.
 SCATTER_UNIT, SHARE_UNIT = 0.01, 4e-4
+#: Scatter, in its unit, of specimens that are all but alike.
+HARDLY = 1e-3
 #: Gain of −2 log likelihood in a step below which it is the last one.
 ENOUGH = 1e-4
 #: Step of a difference quotient.
@@ -106,6 +108,7 @@ def estimate(
     *,
     given: float | None = None,
     smooth: bool = False,
+    thorough: bool = False,
     usual_scatter: float = CRITERIA.usual_scatter,
 ) -> Estimate:
     """Variance components with the largest restricted likelihood.
@@ -116,6 +119,8 @@ def estimate(
         given: one sigma of a reading as it was stated; it may be wrong, but not by much.
         smooth: whether a smooth line through each run is allowed for, so that what a model misses
             does not count as noise.
+        thorough: whether it is begun from specimens that are alike as well: there may be more than
+            one maximum.
         usual_scatter: of specimens, as a share: sigma of a half-normal prior of every τ.
     """
     problem = _Problem(at, given, smooth, usual_scatter)
@@ -130,14 +135,23 @@ def estimate(
     bounds += [(0.0, np.inf)] * (len(groups) + smooth)
     x0 = np.clip(begin, [low for low, _ in bounds], [high for _, high in bounds])
     problem.origin = problem.cost(x0)[0]
-    found = minimize(
-        problem.with_slope,
-        x0,
-        method="L-BFGS-B",
-        jac=True,
-        bounds=bounds,
-        options={"maxiter": 60, "ftol": ENOUGH},
-    )
+    begins = [x0]
+    if thorough and groups:
+        alike = x0.copy()
+        alike[3 : 3 + len(groups)] = HARDLY
+        begins.append(alike)
+    tried = [
+        minimize(
+            problem.with_slope,
+            begin,
+            method="L-BFGS-B",
+            jac=True,
+            bounds=bounds,
+            options={"maxiter": 60, "ftol": ENOUGH},
+        )
+        for begin in begins
+    ]
+    found = min(tried, key=lambda one: float(one.fun))
     restricted, likelihood = problem.cost(found.x)
     noise, taus, omega = problem.split(found.x)
     variances = Variances(noise, dict(zip(groups, taus.tolist(), strict=True)))

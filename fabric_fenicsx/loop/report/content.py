@@ -55,8 +55,10 @@ def test_report(
         "schema": SCHEMA,
         "test": d.experiment.test,
         "verdict": d.verdict,
-        "effects": [_effect(d, effect) for effect in d.effects if effect.listed],
+        "effects": [] if terms else [_effect(d, effect) for effect in d.effects],
         "discovered": discovered_report(d, terms),
+        # Effects with a name in a model that needs terms without one: they may be part of those.
+        "beside": [_effect(d, e) for e in d.effects if e.listed] if terms else [],
         "candidates": [
             {
                 "name": c.effect.name,

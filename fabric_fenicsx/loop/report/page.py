@@ -170,7 +170,8 @@ def _run_names(report: Mapping[str, Any]) -> list[str]:
 
 def _candidate_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Candidates, the best criterion first, and what became of each."""
-    chosen = {effect["name"]: effect["rivals"] for effect in report["effects"]}
+    named = [*report["effects"], *report["beside"]]
+    chosen = {effect["name"]: effect["rivals"] for effect in named}
     chosen |= {term["of"]: term["rival_names"] for term in report["discovered"]}
     before = report["criterion"]["before"]
     rows = []
@@ -216,7 +217,7 @@ def _parameter_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:
     groups = [("baseline", list(report["baseline"]["parameters"]))]
     groups += [
         (f"{effect['name']}: {effect['variant']}", list(effect["parameters"]))
-        for effect in report["effects"]
+        for effect in (*report["effects"], *report["beside"])
     ]
     groups += [
         (f"{term['name']}: {term['variant']}", list(term["parameters"]))

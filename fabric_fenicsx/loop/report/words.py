@@ -120,8 +120,8 @@ def _discovered(report: Mapping[str, Any], before: str, after: str, scatter: str
         f"{_listed([v.replace('_', ' ') for v in term['depends_on']])} ({term['name']})"
         for term in terms
     ]
-    names = [effect["name"] for effect in report["effects"]]
-    beside = f", beside {_listed(names)}" if names else ""
+    names = [effect["name"] for effect in report["beside"]]
+    beside = f", beside {_listed(names)}, which may be part of it" if names else ""
     text = (
         f"No known effect explains the residual; {_listed(found)} does{beside}: held-out error "
         f"{before} before, {after} after{_foreseen(report)}; {scatter}."
@@ -199,6 +199,7 @@ def reasons(report: Mapping[str, Any]) -> list[str]:
             "standard errors from nothing, or it predicts stretches that are left out no better."
         ]
     chosen = [effect["name"] for effect in report["effects"]]
+    chosen += [effect["name"] for effect in report["beside"]]
     chosen += [term["of"] for term in report["discovered"]]
     found = []
     for c in (c for c in tried if c["name"] not in chosen):

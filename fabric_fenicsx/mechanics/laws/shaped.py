@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import pi
 from typing import Any, Literal, Self
 
-from ufl import conditional, cos, exp, gt, ln, lt, max_value, min_value, sin, tanh
+from ufl import conditional, cos, exp, ge, gt, ln, lt, max_value, min_value, sin, tanh
 
 from ...inputs.groups import NotNegative, Positive
 from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, size_of
@@ -25,8 +25,10 @@ Variable = Literal[
     "recent_largest_angle",
     "recent_rate",
 ]
-Kind = Literal["spline", "step", "saturation", "logarithm"]
-Base = Literal["elastic", "viscous", "dissipative", "odd", "even", "odd_in_rate", "even_in_rate"]
+Kind = Literal["spline", "graded", "step", "saturation", "logarithm"]
+Base = Literal[
+    "elastic", "viscous", "dissipative", "smooth", "odd", "even", "odd_in_rate", "even_in_rate"
+]
 
 
 def _fading(at: Crossing, memory: Any) -> Any:
@@ -62,6 +64,12 @@ VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
 Angles in rad, the path Σ|Δγ|, the time since the beginning [s]; all but the first two remember.
 """
 
+FRICTION = ("dissipative", "smooth")
+"""Bases that remember how far a stick is bent."""
+
+GRADED = (0.05, 0.1, 0.2, 0.4)
+"""Knots of a graded spline between its ends."""
+
 AT_HAND = ("angle", "rate")
 """Those that do not."""
 
@@ -71,7 +79,8 @@ def shape_of(kind: str, coefficients: Any, x: Any, place: Any = 0.5, width: Any 
 
     Args:
         kind: "spline", a C¹ quadratic one with as many equal pieces less one as coefficients,
-            Σ c_k x^k for the first two, then c_k (x − t_k)₊²; "step", c / (1 + exp(−(x − x₀)/w));
+            Σ c_k x^k for the first two, then c_k (x − t_k)₊²; "graded", one with the knots GRADED,
+            for what bends at the beginning; "step", c / (1 + exp(−(x − x₀)/w));
             "saturation", c (1 − exp(−x/w)); "logarithm", c ln(1 + x/w); "periodic",
             c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1);
             "sign", c tanh(x/w).
@@ -93,10 +102,11 @@ def shape_of(kind: str, coefficients: Any, x: Any, place: Any = 0.5, width: Any 
         return c[0] * sin(turn) + c[1] * (cos(turn) - 1)
     if kind == "sign":
         return c[0] * tanh(x / width)
-    count = len(c)
+    pieces = max(len(c) - 1, 1)
+    knots = GRADED if kind == "graded" else [k / pieces for k in range(1, pieces)]
     value = c[0] * x
-    for k in range(1, count):
-        from_knot = x if k == 1 else max_value(x - (k - 1) / max(count - 1, 1), 0)
+    for k, knot in enumerate((0.0, *knots)[: len(c) - 1], 1):
+        from_knot = x if knot == 0.0 else max_value(x - knot, 0)
         value = value + c[k] * from_knot**2
     return value
 
@@ -110,7 +120,8 @@ class ShapedLaw(CrossingLaw):
 
     Attributes:
         base: of what it is a factor: "elastic" k₁ γ + k₃ γ³, "viscous" γ̇, "dissipative" a friction
-            of limit 1 with a stick, "odd" sign γ, "even" 1, "odd_in_rate" sign γ̇, "even_in_rate" 1.
+            of limit 1 with a stick, "smooth" Dahl's of limit 1, "odd" sign γ, "even" 1,
+            "odd_in_rate" sign γ̇, "even_in_rate" 1.
         variable: v, see VARIABLES.
         reach: v_max [rad, rad/s or s].
         coefficients: of f: [-] of the elastic base, [N mm s] of the viscous one, else [N mm].
@@ -118,7 +129,7 @@ class ShapedLaw(CrossingLaw):
         shape: one of those of ``shape_of`` that Kind names.
         place, width: its x₀ and w, as shares of v_max.
         k1, k3: of the elastic base [N mm].
-        stick_angle: of the dissipative base [rad].
+        stick_angle: of a friction [rad].
         memory: τ of a variable that forgets [s].
     """
 
@@ -132,7 +143,7 @@ class ShapedLaw(CrossingLaw):
     width: Any = number("width", "of a step or a saturation, as a share of it", Positive, 0.1)
     k1: Any = per_area("k1_N_mm", "linear part of the elastic base", NotNegative, 0.0)
     k3: Any = per_area("k3_N_mm", "cubic part of the elastic base", NotNegative, 0.0)
-    stick_angle: Any = in_degrees("stick_angle_deg", "of the dissipative base", default=0.5)
+    stick_angle: Any = in_degrees("stick_angle_deg", "of a friction", default=0.5)
     memory: Any = number("memory_s", "of a variable that forgets", default=1.0)
 
     law = "shaped"
@@ -166,7 +177,7 @@ class ShapedLaw(CrossingLaw):
     def history(self, at: Crossing) -> dict[str, Any]:
         """The variable, if it remembers, and the moment of the friction over its limit."""
         history = {} if self.variable in AT_HAND else {"variable": self.variable_at(at)}
-        if self.base == "dissipative":
+        if self.base in FRICTION:
             history["stick"] = self._base_at(at)
         return history
 
@@ -178,6 +189,10 @@ class ShapedLaw(CrossingLaw):
         if self.base == "dissipative":
             trial = at.past("stick") + at.change / at.number(self.stick_angle)
             return max_value(min_value(trial, 1), -1)
+        if self.base == "smooth":
+            step = at.change / at.number(self.stick_angle)
+            kept, sign = exp(-size_of(step)), conditional(ge(step, 0), 1.0, -1.0)
+            return kept * at.past("stick") + (1 - kept) * sign
         if self.base == "odd":
             return signed(at.gamma, 1.0)
         if self.base == "odd_in_rate":

@@ -14,7 +14,7 @@ import numpy as np
 from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shaped import ShapedLaw, shape_of
+from ....mechanics.laws.shaped import GRADED, ShapedLaw, shape_of
 from ...inference.effects import Effect, Shape, Values
 from .variant import FrameVariant
 
@@ -72,7 +72,8 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             groups.setdefault(_reported(variable), []).append(variable)
         for reported, own in groups.items():
             name = f"{base}_moment_of_{reported}"
-            forms = [f for v in own for f in _laws(name, base, v, largest)]
+            alike = ("dissipative", "smooth") if base == "dissipative" else (base,)
+            forms = [f for b in alike for v in own for f in _laws(name, b, v, largest)]
             depends_on = (reported, *also.get(base, ()))
             about = f"{base.replace('_', ' ')} moment, by {reported.replace('_', ' ')}"
             yield Effect(
@@ -96,7 +97,9 @@ X["recent_largest_angle"] = "recent_largest_angle_rad"
 """Variables with their units."""
 
 Y = {"elastic": "share_of_elastic_moment", "viscous": "moment_per_rate_N_s"}
-Y |= dict.fromkeys(("dissipative", "odd", "even", "odd_in_rate", "even_in_rate"), "moment_N")
+Y |= dict.fromkeys(
+    ("dissipative", "smooth", "odd", "even", "odd_in_rate", "even_in_rate"), "moment_N"
+)
 Y |= {"reading": "reading_N", "travel": "travel_mm"}
 """What a term is a factor of, or adds, with units."""
 
@@ -117,7 +120,7 @@ def _laws(
         full = largest["time"]
         starts = tuple(share * full for share in MEMORIES)
         fixed["memory"] = Parameter(f"{name}_memory_s", starts, starts[0] / 10.0, full)
-    if base == "dissipative":
+    if base in ("dissipative", "smooth"):
         fixed["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-4, 0.3)
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
     of_baseline = ("k1_N", "k3_N") if base == "elastic" else ()
@@ -126,7 +129,7 @@ def _laws(
         parameters = [*coefficients, *(n for n in own.values() if isinstance(n, Parameter))]
         own["coefficients"] = coefficients
         yield FrameVariant(
-            f"{variable.replace('_', ' ')}, {label}",
+            f"{variable.replace('_', ' ')}, {label}" + (", smooth" if base == "smooth" else ""),
             tuple(sorted(parameters, key=lambda p: not p.amplitude)),
             Shape(X[variable], Y[base], largest[variable], partial(_factor, own), own),
             laws=partial(_law, own),
@@ -176,6 +179,8 @@ def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...]
         decay = Parameter(f"{name}_decay", DECAYS, 0.01, 2.0)
         yield "saturation", one, {"shape": "saturation", "width": decay}
     if wealth == len(SPLINES):
+        own = tuple(Parameter(f"{name}_{k + 1}", amplitude=True) for k in range(len(GRADED) + 2))
+        yield "graded", own, {"shape": "graded"}
         bend = Parameter(f"{name}_bend", BENDS, 1e-3, 1.0)
         yield "logarithm", one, {"shape": "logarithm", "width": bend}
 
