@@ -147,7 +147,8 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
         for heading in ("", "parameter", "value", "±", "unit"):
             table.add_column(heading, no_wrap=True, overflow="fold")
         model = part["model"]
-        for effect in [{"name": "baseline", **part["baseline"]}, *part["effects"]]:
+        found = [*part["effects"], *part["beside"], *part["discovered"]]
+        for effect in [{"name": "baseline", **part["baseline"]}, *found]:
             # The baseline's as they are in the model that is reported.
             for k, name in enumerate(effect["parameters"]):
                 table.add_row(
