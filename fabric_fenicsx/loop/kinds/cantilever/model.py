@@ -29,7 +29,8 @@ from ...inference.experiment import NO_DEVIATIONS, Deviations, Law
 from ...measurement.readings import common_noise, readings_of, specimens_of
 from ...measurement.schema import Measurement
 from .effects import CANTILEVER_EFFECTS
-from .hanging import HangingTow, Laws, Shape
+from .hanging import HangingTow, Laws, Shape, sum_of
+from .terms import terms
 from .variant import StripVariant
 
 __all__ = ["Cantilever"]
@@ -52,6 +53,17 @@ SPIKE = 4.0
 LAW_POINTS = 201
 #: Points on a predicted line among which the nearest to a reading is looked for.
 FINE = 400
+
+PLACE = ("s", "length")
+LAWS: dict[str, tuple[str, tuple[str, ...], bool]] = {
+    "moment": ("moment", ("kappa",), False),
+    "unloaded": ("unloaded", PLACE, False),
+    "slope": ("slope", ("root",), False),
+    "added_moment": ("moment", ("kappa", *PLACE), True),
+    "added_curvature": ("unloaded", PLACE, True),
+    "load": ("load", PLACE, True),
+}
+"""Expressions of a variant: what they give (see Laws), of what, and whether of a place as one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +107,6 @@ class Cantilever:
     quantity = "z_mm"
     notes = ()
     one_curve = None
-    terms = ()
 
     def __init__(
         self,
@@ -135,8 +146,26 @@ class Cantilever:
         self.readings = readings_of(
             measurements, self._observed, covariates, weight=weight, chain=chain
         )
+        self._largest_curvature = curvature
         shares = {"curvature": curvature, "moment": moment}
         self.effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
+
+    @property
+    def terms(self) -> list[Effect]:
+        """Terms without a formula over what the fitted readings reached."""
+        rows = self.readings.fit
+        places = np.concatenate([own.x for own in self._specimens])
+        order = np.concatenate([own.rows for own in self._specimens])
+        x = np.empty_like(places)
+        x[order] = places
+        return terms(
+            {
+                "length": float(self._length[rows].max()),
+                "curvature": self._largest_curvature,
+                "x": float(np.abs(x[rows]).max()),
+                "z": float(np.abs(self._observed[rows]).max()),
+            }
+        )
 
     def _lay_out(self, measurements: Sequence[Measurement]) -> None:
         """Readings in the order of runs, in a run by length and along the strip."""
@@ -262,7 +291,7 @@ class Cantilever:
             mine = {name: value * factors.get(name, 1.0) for name, value in values.items()}
             key = (id(own.tow), *mine.values())
             shape = shapes[key] = shapes.get(key) or own.tow.solve(mine, laws[own.upside_down])
-            heights, changes = self._heights(own, shape.x, shape.z, shape.slopes)
+            heights, changes = self._heights(own, *self._seen(shape, own, strips, mine))
             expected[own.rows] = heights
             for name, change in changes.items():
                 slopes[name][own.rows] = change * factors.get(name, 1.0)
@@ -270,6 +299,8 @@ class Cantilever:
 
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law:
         """Moment per width of the curvature beyond that unloaded, up to the largest one reached.
+
+        Where it varies along the strip it is that at the clamp.
 
         Raises:
             SolveError: the model has no solution there.
@@ -282,9 +313,11 @@ class Cantilever:
         ]
         kappa = np.linspace(0.0, max(float(np.abs(s.curvature).max()) for s in shapes), LAW_POINTS)
         per_C1 = self.stiffness_per_C1
+        longest = max(own.tow.length for own in self._specimens)
+        clamp = {"s": Varying(np.zeros(LAW_POINTS)), "length": Varying(np.full(LAW_POINTS, longest))}
         moment, slopes = values["C1_MPa"] * per_C1 * kappa, {"C1_MPa": per_C1 * kappa}
         for own in laws.moments:
-            added = own({"kappa": Varying(kappa)}, {**values, "B": values["C1_MPa"] * per_C1})
+            added = own({"kappa": Varying(kappa), **clamp}, {**values, "B": values["C1_MPa"] * per_C1})
             moment = moment + added["moment"].value
             for name, slope in added["moment"].slopes.items():
                 name, scale = ("C1_MPa", per_C1) if name == "B" else (name, 1.0)
@@ -334,30 +367,62 @@ class Cantilever:
         return at
 
     def _laws(self, variants: Sequence[StripVariant], upside_down: bool) -> Laws:
-        def those(result: str, of: str) -> list[Marched]:
-            mine = (v for v in variants if getattr(v, result) is not None)
-            return [self._law(v, result, of, upside_down) for v in mine]
+        def those(*names: str) -> list[Marched]:
+            mine = ((v, name) for name in names for v in variants if getattr(v, name) is not None)
+            return [self._law(v, name, upside_down) for v, name in mine]
 
         return Laws(
-            moments=those("moment", "kappa"),
-            unloaded=those("unloaded", "kappa"),
-            slopes=those("slope", "root"),
+            moments=those("moment", "added_moment"),
+            unloaded=those("unloaded", "added_curvature"),
+            slopes=those("slope"),
+            loads=those("load"),
         )
 
-    def _law(self, variant: StripVariant, result: str, of: str, upside_down: bool) -> Marched:
+    def _law(self, variant: StripVariant, name: str, upside_down: bool) -> Marched:
         """One of a variant's expressions, with its derivatives.
 
         What belongs to the strip turns over with it: m(κ) becomes -m(-κ) and κ0 becomes -κ0.
         """
-        turned = upside_down and result != "slope"
-        key = (variant, result, turned)
+        turned = upside_down and name not in ("slope", "load")
+        key = (variant, name, turned)
         if key not in self._compiled:
-            law = Marched((of,), ("B", *(p.name for p in variant.parameters)))
+            result, inputs, by_place = LAWS[name]
+            law = Marched(inputs, ("B", *(p.name for p in variant.parameters)))
             sign = -1.0 if turned else 1.0
-            given = (law.at,) if result == "unloaded" else (law.at, sign * law.at[of])
-            expression = sign * getattr(variant, result)(*given)
+            at = {of: sign * law.at[of] if of == "kappa" else law.at[of] for of in inputs}
+            given = (at,) if by_place else tuple(at[of] for of in inputs if of not in PLACE)
+            expression = sign * getattr(variant, name)(law.at, *given)
             self._compiled[key] = law.define({result: expression}, {})
         return self._compiled[key]
+
+    def _seen(
+        self, shape: Shape, own: _Specimen, variants: Sequence[StripVariant], values: Any
+    ) -> tuple[Array, Array, dict[str, Array]]:
+        """Nodes as the camera sees them: x, z and derivatives, as those of a shape."""
+        x, z = (
+            Varying(place, {name: slope[k] for name, slope in shape.slopes.items()})
+            for k, place in enumerate((shape.x, shape.z))
+        )
+        length = Varying(np.full(len(shape.x), own.tow.length))
+        known = {"x": x, "z": z, "s": Varying(own.tow.arc), "length": length}
+        for v in variants:
+            if v.camera is None:
+                continue
+            key = (v, "camera", False)
+            if key not in self._compiled:
+                law = Marched(tuple(known), tuple(p.name for p in v.parameters))
+                out, up = v.camera(law.at, law.at)
+                self._compiled[key] = law.define({"x": out, "z": up}, {})
+            added = self._compiled[key](known, values)
+            known |= {k: sum_of((known[k], added[k])) for k in ("x", "z")}
+        names = {**known["x"].slopes, **known["z"].slopes} if shape.slopes else {}
+        slopes = {
+            name: np.stack(
+                [np.broadcast_to(known[k].slopes.get(name, 0.0), x.value.shape) for k in ("x", "z")]
+            )
+            for name in names
+        }
+        return known["x"].value, known["z"].value, slopes
 
 
 def _between(at: Array, table: Array, where: float) -> Array:
