@@ -314,10 +314,15 @@ class Cantilever:
         kappa = np.linspace(0.0, max(float(np.abs(s.curvature).max()) for s in shapes), LAW_POINTS)
         per_C1 = self.stiffness_per_C1
         longest = max(own.tow.length for own in self._specimens)
-        clamp = {"s": Varying(np.zeros(LAW_POINTS)), "length": Varying(np.full(LAW_POINTS, longest))}
+        clamp = {
+            "s": Varying(np.zeros(LAW_POINTS)),
+            "length": Varying(np.full(LAW_POINTS, longest)),
+        }
         moment, slopes = values["C1_MPa"] * per_C1 * kappa, {"C1_MPa": per_C1 * kappa}
         for own in laws.moments:
-            added = own({"kappa": Varying(kappa), **clamp}, {**values, "B": values["C1_MPa"] * per_C1})
+            added = own(
+                {"kappa": Varying(kappa), **clamp}, {**values, "B": values["C1_MPa"] * per_C1}
+            )
             moment = moment + added["moment"].value
             for name, slope in added["moment"].slopes.items():
                 name, scale = ("C1_MPa", per_C1) if name == "B" else (name, 1.0)
