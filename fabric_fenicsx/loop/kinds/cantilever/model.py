@@ -73,6 +73,7 @@ class _Specimen:
     Attributes:
         tow: its model.
         specimen: its number.
+        run: its number.
         rows: places of the readings, (n,).
         s, x, z: of the readings [mm], (n,); s is NaN where it is not known.
         upside_down: whether it was turned over in its clamp.
@@ -80,6 +81,7 @@ class _Specimen:
 
     tow: HangingTow
     specimen: int
+    run: int
     rows: npt.NDArray[np.int64]
     s: Array
     x: Array
@@ -158,21 +160,20 @@ class Cantilever:
         order = np.concatenate([own.rows for own in self._specimens])
         x = np.empty_like(places)
         x[order] = places
-        return terms(
-            {
-                "length": float(self._length[rows].max()),
-                "curvature": self._largest_curvature,
-                "x": float(np.abs(x[rows]).max()),
-                "z": float(np.abs(self._observed[rows]).max()),
-            }
-        )
+        ranges = {
+            "length": float(self._length[rows].max()),
+            "curvature": self._largest_curvature,
+            "x": float(np.abs(x[rows]).max()),
+            "z": float(np.abs(self._observed[rows]).max()),
+        }
+        return terms(ranges, np.unique(self._run[rows]).tolist())
 
     def _lay_out(self, measurements: Sequence[Measurement]) -> None:
         """Readings in the order of runs, in a run by length and along the strip."""
         tows: dict[tuple[Any, ...], HangingTow] = {}
         table: list[Array] = []
         run_of: list[npt.NDArray[np.int64]] = []
-        keys: list[tuple[int, tuple[Any, ...]]] = []
+        keys: list[tuple[int, int, tuple[Any, ...]]] = []
         specimens = specimens_of(measurements)
         number = 0
         for m in measurements:
@@ -189,7 +190,7 @@ class Cantilever:
                 for length in columns[0]:
                     size = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
                     key = (*size, m.rig.upside_down)
-                    keys.append((specimens[number], key))
+                    keys.append((specimens[number], number, key))
                     if key not in tows:
                         tows[key] = HangingTow(*size)
                 number += 1
@@ -200,13 +201,14 @@ class Cantilever:
             rows = np.array([i for i, other in enumerate(keys) if other == own])
             self._specimens.append(
                 _Specimen(
-                    tows[own[1]],
+                    tows[own[2]],
                     own[0],
+                    own[1],
                     rows,
                     self._arc[rows],
                     x[rows],
                     self._observed[rows],
-                    own[1][-1],
+                    own[2][-1],
                 )
             )
 
@@ -292,6 +294,8 @@ class Cantilever:
             key = (id(own.tow), *mine.values())
             shape = shapes[key] = shapes.get(key) or own.tow.solve(mine, laws[own.upside_down])
             heights, changes = self._heights(own, *self._seen(shape, own, strips, mine))
+            for zeros in (v for v in strips if v.each_run):
+                heights, changes = self._with_zero(own, zeros, values, heights, changes)
             expected[own.rows] = heights
             for name, change in changes.items():
                 slopes[name][own.rows] = change * factors.get(name, 1.0)
@@ -399,6 +403,24 @@ class Cantilever:
             expression = sign * getattr(variant, name)(law.at, *given)
             self._compiled[key] = law.define({result: expression}, {})
         return self._compiled[key]
+
+    def _with_zero(
+        self,
+        own: _Specimen,
+        variant: StripVariant,
+        values: Mapping[str, float],
+        heights: Array,
+        changes: dict[str, Array],
+    ) -> tuple[Array, dict[str, Array]]:
+        """The same with the zero of the run; of one that is not fitted, what fits best there."""
+        for p in variant.parameters:
+            if p.run == own.run:
+                return heights + values[p.name], {**changes, p.name: np.ones(len(heights))}
+        seen = self.readings.usable[own.rows]
+        if seen.any():
+            heights = heights + np.mean((self._observed[own.rows] - heights)[seen])
+            changes = {name: change - np.mean(change[seen]) for name, change in changes.items()}
+        return heights, changes
 
     def _seen(
         self, shape: Shape, own: _Specimen, variants: Sequence[StripVariant], values: Any

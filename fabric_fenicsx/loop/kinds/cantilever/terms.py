@@ -15,7 +15,7 @@ differs from clamp_tilt by as much as a strip bends differently when it is tilte
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -23,7 +23,7 @@ from ufl import exp, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import shape_of
-from ...inference.effects import Effect, Values
+from ...inference.effects import Effect, Values, of_run
 from .variant import StripVariant
 
 __all__ = ["terms"]
@@ -55,14 +55,15 @@ Shape = tuple[str, tuple[Parameter, ...], Of]
 """A shape over one variable: label, parameters, and the expression."""
 
 
-def terms(ranges: Mapping[str, float]) -> list[Effect]:
+def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
     """The terms of a cantilever.
 
     Args:
         ranges: largest value in the fitted readings of "length", "x", "z" [mm] and of the
             baseline's "curvature" [1/mm].
+        runs: that are fitted, counted from 0.
     """
-    return [*_of_the_strip(ranges), *_of_the_camera(ranges)]
+    return [*_of_the_strip(ranges), *_of_the_camera(ranges), *_of_the_run(runs)]
 
 
 def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
@@ -186,6 +187,14 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         for shape in _splines(name, SPLINES[:1])
     ]
     yield _term(name, "heights, or their scale, by the overhang", "reading", ("length",), forms)
+
+
+def _of_the_run(runs: Sequence[int]) -> Iterator[Effect]:
+    if len(runs) > 1:
+        name = "reading_of_run"
+        zero = Parameter(f"{name}_zero_mm", amplitude=True)
+        forms = [StripVariant("zero", tuple(of_run(zero, k) for k in runs), each_run=True)]
+        yield _term(name, "a zero of the heights in each run", "reading", ("run",), forms)
 
 
 def _higher(

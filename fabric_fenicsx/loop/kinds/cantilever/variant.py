@@ -28,6 +28,8 @@ class StripVariant(Variant):
         load: of a place, by what share of itself the weight is more there.
         camera: by how much a place is seen further out and higher than it is [mm], (x, z), of the
             place and its own ``x`` and ``z`` [mm].
+        each_run: the parameters are the zeros of the heights, one of each run [mm]. That of
+            another run can only come from that run: its error is then what is left after it.
     """
 
     moment: Callable[[Values, Any], Any] | None = None
@@ -37,3 +39,4 @@ class StripVariant(Variant):
     added_curvature: Callable[[Values, Values], Any] | None = None
     load: Callable[[Values, Values], Any] | None = None
     camera: Callable[[Values, Values], tuple[Any, Any]] | None = None
+    each_run: bool = False
