@@ -30,6 +30,7 @@ from ...measurement.readings import common_noise, readings_of, specimens_of
 from ...measurement.schema import Measurement
 from .effects import CANTILEVER_EFFECTS
 from .hanging import HangingTow, Laws, Shape, sum_of
+from .measured_line import scatter_of_x, smooth_line
 from .terms import terms
 from .variant import StripVariant
 
@@ -43,12 +44,6 @@ LOADS = np.logspace(-2.0, 3.0, 51)
 REACH = 1e3
 #: Steepest slope, as a tangent, at which a distance along the normal stands for a height.
 STEEPEST = 5.0
-#: Degree of the polynomials that smooth a measured line.
-SMOOTH = 5
-#: Readings without arc length from which their scatter is found.
-FEWEST = 12
-#: Sigmas from which a reading is not taken for scatter.
-SPIKE = 4.0
 #: Points of a law that is shown.
 LAW_POINTS = 201
 #: Points on a predicted line among which the nearest to a reading is looked for.
@@ -249,7 +244,7 @@ class Cantilever:
         for own in self._specimens:
             for run in np.unique(self._run[own.rows]):
                 mine = self._run[own.rows] == run
-                slope[own.rows[mine]], away = _smooth(own.x[mine], own.z[mine])
+                slope[own.rows[mine]], away = smooth_line(own.x[mine], own.z[mine])
                 if np.isnan(own.s[mine]).all():
                     # The line may not be as smooth as the polynomials: so differences, again.
                     differences.append(away[1:-1] - (away[:-2] + away[2:]) / 2.0)
@@ -258,7 +253,7 @@ class Cantilever:
                     shares.append(part[1:-1] + (part[:-2] + part[2:]) / 4.0)
         if not shares:
             return slope, 1.0
-        return slope, _scatter(np.concatenate(differences), np.concatenate(shares), self.noise)
+        return slope, scatter_of_x(np.concatenate(differences), np.concatenate(shares), self.noise)
 
     def _baseline_lines(self, C1: float) -> tuple[Array, float, float]:
         """Arc length of every reading, and the largest curvature and moment per width."""
@@ -423,33 +418,38 @@ class Cantilever:
         return heights, changes
 
     def _seen(
-        self, shape: Shape, own: _Specimen, variants: Sequence[StripVariant], values: Any
+        self,
+        shape: Shape,
+        own: _Specimen,
+        variants: Sequence[StripVariant],
+        values: Mapping[str, float],
     ) -> tuple[Array, Array, dict[str, Array]]:
         """Nodes as the camera sees them: x, z and derivatives, as those of a shape."""
-        x, z = (
-            Varying(place, {name: slope[k] for name, slope in shape.slopes.items()})
-            for k, place in enumerate((shape.x, shape.z))
-        )
-        length = Varying(np.full(len(shape.x), own.tow.length))
-        known = {"x": x, "z": z, "s": Varying(own.tow.arc), "length": length}
-        for v in variants:
-            if v.camera is None:
-                continue
+        cameras = [v for v in variants if v.camera is not None]
+        if not cameras:
+            return shape.x, shape.z, shape.slopes
+        known = {
+            "x": Varying(shape.x, {name: slope[0] for name, slope in shape.slopes.items()}),
+            "z": Varying(shape.z, {name: slope[1] for name, slope in shape.slopes.items()}),
+            "s": Varying(own.tow.arc),
+            "length": Varying(np.full_like(shape.x, own.tow.length)),
+        }
+        for v in cameras:
             key = (v, "camera", False)
             if key not in self._compiled:
+                assert v.camera is not None
                 law = Marched(tuple(known), tuple(p.name for p in v.parameters))
                 out, up = v.camera(law.at, law.at)
                 self._compiled[key] = law.define({"x": out, "z": up}, {})
             added = self._compiled[key](known, values)
             known |= {k: sum_of((known[k], added[k])) for k in ("x", "z")}
-        names = {**known["x"].slopes, **known["z"].slopes} if shape.slopes else {}
+        x, z = known["x"], known["z"]
+        zero = np.zeros_like(shape.x)
         slopes = {
-            name: np.stack(
-                [np.broadcast_to(known[k].slopes.get(name, 0.0), x.value.shape) for k in ("x", "z")]
-            )
-            for name in names
+            name: np.stack([v.slopes.get(name, zero) + zero for v in (x, z)])
+            for name in {**x.slopes, **z.slopes}
         }
-        return known["x"].value, known["z"].value, slopes
+        return x.value, z.value, slopes
 
 
 def _between(at: Array, table: Array, where: float) -> Array:
@@ -459,52 +459,3 @@ def _between(at: Array, table: Array, where: float) -> Array:
         return table[0]
     share = float(np.clip((where - at[k]) / (at[k + 1] - at[k]), 0.0, 1.0))
     return (1.0 - share) * table[k] + share * table[k + 1]
-
-
-def _smooth(x: Array, z: Array) -> tuple[Array, Array]:
-    """Slope of a measured line [rad], and how far its readings are from a smooth one [mm].
-
-    The smooth line leaves the clamp at the origin; x and z are polynomials of the distance from
-    there, which is good enough an arc length for that.
-
-    Args:
-        x: of the readings [mm], (n,).
-        z: of the readings [mm], (n,).
-    """
-    far = np.hypot(x, z)
-    u = far / far.max()
-    degree = int(np.clip(len(x) // 3, 1, SMOOTH))
-    powers = np.arange(1, degree + 1)
-    basis = u[:, None] ** powers
-    fitted = np.linalg.lstsq(basis, np.stack([x, z], axis=1), rcond=None)[0]
-    along = (powers * u[:, None] ** (powers - 1)) @ fitted
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    gap = np.stack([x, z], axis=1) - basis @ fitted
-    away = gap[:, 1] * along[:, 0] - gap[:, 0] * along[:, 1]
-    return np.arctan2(along[:, 1], along[:, 0]), away
-
-
-def _scatter(differences: Array, shares: Array, noise: float | None) -> float:
-    """Scatter of x over that of z, from how readings scatter where the line is steep.
-
-    The largest that is nearly as likely as the likeliest, and no more than one: a scatter that is
-    taken for too small would pass for an effect.
-
-    Args:
-        differences: of distances from a smooth line from the mean of both neighbours' [mm], (n,).
-        shares: of the variance of z and of that of x in their variance, (n, 2).
-        noise: sigma of z [mm] where it is given.
-    """
-    if len(differences) < FEWEST:
-        return 1.0
-
-    def unlikely(ratio: float, sigma: float) -> float:
-        variance = sigma**2 * (shares @ [1.0, ratio**2] + 1e-4)
-        # A spike says nothing of the scatter.
-        return float(np.sum(np.log(variance) + np.minimum(differences**2 / variance, SPIKE**2)))
-
-    typical = 1.5 * float(np.median(np.abs(differences))) + 1e-12
-    sigmas = [noise] if noise else typical * np.logspace(-0.5, 0.5, 31)
-    ratios = np.linspace(0.0, 1.0, 11)
-    cost = np.array([min(unlikely(ratio, sigma) for sigma in sigmas) for ratio in ratios])
-    return float(ratios[cost <= cost.min() + 1.0].max())
