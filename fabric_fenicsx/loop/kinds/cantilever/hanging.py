@@ -5,8 +5,9 @@ clamp is at the origin, x goes out horizontally, z up; curvature, moment and slo
 where the tow bends upwards. A turn φ of the root is exact: the model is solved with gravity
 turned by -φ and its shape turned by φ.
 
-What an effect adds to the bending moment is one more term of the model, ∫ m(κ) δκ ds. The beam has
-one point per cell, so m and dm/dκ are numbers there, and any law is added without new forms.
+What an effect adds to the bending moment is one more term of the model, ∫ m(κ, s) δκ ds. The beam
+has one point per cell, so m and dm/dκ are numbers there, and any law is added without new forms.
+What it adds to the weight is a number in each cell as well, and half of it hangs at either end.
 At balance R(w, p) = 0, so dw/dp = -K⁻¹ ∂R/∂p (direct differentiation) from one factorisation.
 """
 
@@ -33,7 +34,7 @@ from ....solving.model import Model, Support
 from ....solving.update import advance_fields
 from ...expressions.marching import Marched, Varying
 
-__all__ = ["HangingTow", "Laws", "Shape"]
+__all__ = ["HangingTow", "Laws", "Shape", "sum_of"]
 
 Array = npt.NDArray[np.float64]
 
@@ -58,15 +59,18 @@ class Laws:
     """What effects add to a strip.
 
     Attributes:
-        moments: of the curvature ``kappa`` beyond that unloaded [1/mm] and of ``B`` [N mm], the
+        moments: of the curvature ``kappa`` beyond that unloaded [1/mm], of ``B`` [N mm], of the
+            arc length ``s`` from the clamp and the ``length`` of the overhang [mm], the
             ``moment`` per width [N].
-        unloaded: the curvature ``unloaded`` [1/mm].
+        unloaded: of ``s`` and ``length``, the curvature ``unloaded`` [1/mm].
         slopes: of the root's moment per width ``root`` [N], the ``slope`` of the root [rad].
+        loads: of ``s`` and ``length``, the ``load`` beyond the weight, as a share of it.
     """
 
     moments: Sequence[Marched] = ()
     unloaded: Sequence[Marched] = ()
     slopes: Sequence[Marched] = ()
+    loads: Sequence[Marched] = ()
 
     @property
     def bend(self) -> bool:
@@ -137,8 +141,11 @@ class HangingTow:
         fields = self.model.fields
         self._cells = _dolfinx.cell_dofs(self._moment.function_space)[:, 0]
         self._order = self.model.disc.local_cells
-        cell = np.diff(self.arc) / 2.0
-        self._weights = weight * (np.append(cell, 0.0) + np.append(0.0, cell))
+        middle = (self.arc[1:] + self.arc[:-1])[self._order] / 2.0
+        self._along = {"s": Varying(middle), "length": Varying(np.full(CELLS, length))}
+        self._even_mass = fields.mass.x.array.copy()
+        self._even_weights = self._weights = self._at_nodes(np.ones(CELLS))
+        self._weight_slopes: dict[str, Array] = {}
         self._laws, self._values = NONE, {"B": 1.0}
         self._phi, self._root = 0.0, 0.0
         self._state = (fields.u_n.x.array, fields.q_n.x.array)
@@ -158,6 +165,7 @@ class HangingTow:
         """
         self._values = {**values, "B": values["C1_MPa"] * self.stiffness_per_C1}
         self._laws = laws
+        self._load()
         self.model.fields.stiffness.x.array[:] = values["C1_MPa"] * self._unit
         self._newton.force_tolerance = self._rounding * values["C1_MPa"] + 1e-9 * float(
             self._weights.sum() * self._spacing
@@ -219,23 +227,42 @@ class HangingTow:
         It is -B κ0 + Σ m(κ - κ0): added to B κ, the law is that of what exceeds κ0.
         """
         total = Varying(kappa, {"kappa": np.ones_like(kappa)})
-        at_rest = self._at_rest(kappa)
+        at_rest = self._at_rest()
         back = {name: -slope for name, slope in at_rest.slopes.items()}
-        beyond = {"kappa": Varying(kappa - at_rest.value, {**total.slopes, **back})}
+        beyond = {"kappa": Varying(kappa - at_rest.value, {**total.slopes, **back}), **self._along}
         B = self._values["B"]
         shift = {name: B * slope for name, slope in back.items()}
         shift["B"] = shift.get("B", 0.0) - at_rest.value
         own = (law(beyond, self._values)["moment"] for law in self._laws.moments)
-        return _sum((Varying(-B * at_rest.value, shift), *own))
+        return sum_of((Varying(-B * at_rest.value, shift), *own))
 
-    def _at_rest(self, kappa: Array) -> Varying:
+    def _at_rest(self) -> Varying:
         """Curvature of the unloaded strip, with derivatives in the parameters."""
-        given = {"kappa": Varying(kappa)}
-        return _sum(law(given, self._values)["unloaded"] for law in self._laws.unloaded)
+        return sum_of(law(self._along, self._values)["unloaded"] for law in self._laws.unloaded)
+
+    def _load(self) -> None:
+        """Put the weight on that the laws say, in the cells and at the nodes."""
+        self.model.fields.mass.x.array[:] = self._even_mass
+        self._weights, self._weight_slopes = self._even_weights, {}
+        if not self._laws.loads:
+            return
+        more = sum_of(law(self._along, self._values)["load"] for law in self._laws.loads)
+        factor = 1.0 + np.broadcast_to(more.value, (CELLS,))
+        self.model.fields.mass.x.array.reshape(CELLS, -1)[self._cells] *= factor[:, None]
+        self._weights = self._at_nodes(factor)
+        self._weight_slopes = {
+            name: self._at_nodes(slope) for name, slope in more.slopes.items() if name != "B"
+        }
+
+    def _at_nodes(self, factor: Array) -> Array:
+        """The weight per width [N/mm] at each node if it is this many times what it is, (n,)."""
+        half = np.diff(self.arc) / 2.0 * self._weight
+        half = half * np.broadcast_to(factor, half.shape)[self._ordered()]
+        return np.append(half, 0.0) + np.append(0.0, half)
 
     def _turn(self, root: float) -> Varying:
         given = {"root": Varying(np.array(root), {"root": np.array(1.0)})}
-        return _sum(law(given, self._values)["slope"] for law in self._laws.slopes)
+        return sum_of(law(given, self._values)["slope"] for law in self._laws.slopes)
 
     # Balance ------------------------------------------------------------------------------
 
@@ -270,12 +297,14 @@ class HangingTow:
         )
 
     def _unloaded(self) -> list[Array]:
-        """Displacements and rotations without weight: an arc of the unloaded curvature."""
-        kappa = float(np.mean(self._at_rest(np.zeros(1)).value))
-        turn = kappa * self.arc
-        # sin(a)/a and (1 - cos a)/a, also where a is zero.
-        x = self.arc * np.sinc(turn / np.pi)
-        z = self.arc * np.sin(turn / 2.0) * np.sinc(turn / 2.0 / np.pi)
+        """Displacements and rotations without weight: arcs of the unloaded curvature."""
+        cell = np.diff(self.arc)
+        kappa = np.broadcast_to(self._at_rest().value, cell.shape)[self._ordered()]
+        turn = np.append(0.0, np.cumsum(kappa * cell))
+        # The chord of each cell's arc.
+        chord, along = cell * np.sinc(kappa * cell / 2.0 / np.pi), (turn[1:] + turn[:-1]) / 2.0
+        x = np.append(0.0, np.cumsum(chord * np.cos(along)))
+        z = np.append(0.0, np.cumsum(chord * np.sin(along)))
         zero = np.zeros_like(x)
         u = np.stack([x - self.arc, zero, z], axis=1)
         q = np.stack([np.cos(turn / 2.0), zero, -np.sin(turn / 2.0), zero], axis=1)
@@ -327,6 +356,13 @@ class HangingTow:
 
         return moved
 
+    def _pulled(self, weights: Array) -> Array:
+        """Nodal forces of weights per width, (n, 6)."""
+        forces = np.zeros((len(self.arc), 6))
+        forces[:, 0] = -np.sin(self._phi) * weights * self._spacing
+        forces[:, 2] = -np.cos(self._phi) * weights * self._spacing
+        return forces
+
     def _by_turn(self, solve: Callable[[Array], Array]) -> Array:
         """Derivative of x and z in the turn of the root, (2, n)."""
         forces = np.zeros((len(self.arc), 6))
@@ -344,16 +380,15 @@ class HangingTow:
         C1 = self._values["C1_MPa"]
         added = self._moments(self._curvature())
         # At balance the tow's own forces, which are proportional to C1, are weight less the rest.
-        own = np.zeros((len(self.arc), 6))
-        own[:, 0] = -np.sin(self._phi) * self._weights * self._spacing
-        own[:, 2] = -np.cos(self._phi) * self._weights * self._spacing
-        own -= self._work(added.value)
+        own = self._pulled(self._weights) - self._work(added.value)
         forces = {"C1_MPa": -own / C1}
         for name, slope in added.slopes.items():
             if name == "B":
                 forces["C1_MPa"] = forces["C1_MPa"] - self._work(slope) * self.stiffness_per_C1
             elif name != "kappa":
                 forces[name] = -self._work(slope)
+        for name, weights in self._weight_slopes.items():
+            forces[name] = forces.get(name, 0.0) + self._pulled(weights)
         slopes = {name: solve(force) for name, force in forces.items()}
         return self._with_turn(slopes, solve) if self._laws.slopes else slopes
 
@@ -365,12 +400,13 @@ class HangingTow:
         follows = direct.pop("root", 0.0)
         through_B = direct.pop("B", 0.0)
         direct["C1_MPa"] = through_B * self.stiffness_per_C1
-        by_turn = self._by_turn(solve)
+        by_turn, x = self._by_turn(solve), self._positions()[0]
         rigidity = 1.0 - follows * self._root_slope(by_turn)
         slopes = {}
         for name in {**held, **direct}:
             own = held.get(name, np.zeros_like(by_turn))
-            turned = follows * self._root_slope(own) + direct.get(name, 0.0)
+            heavier = -float(self._weight_slopes[name] @ x) if name in self._weight_slopes else 0.0
+            turned = follows * (self._root_slope(own) + heavier) + direct.get(name, 0.0)
             slopes[name] = own + by_turn * turned / rigidity
         return slopes
 
@@ -388,7 +424,8 @@ class HangingTow:
         return np.argsort(self._order)
 
 
-def _sum(parts: Any) -> Varying:
+def sum_of(parts: Any) -> Varying:
+    """The sum of some values, with the derivatives of all."""
     value: Any = 0.0
     slopes: dict[str, Any] = {}
     for part in parts:

@@ -29,7 +29,9 @@ from ...inference.experiment import NO_DEVIATIONS, Deviations, Law
 from ...measurement.readings import common_noise, readings_of, specimens_of
 from ...measurement.schema import Measurement
 from .effects import CANTILEVER_EFFECTS
-from .hanging import HangingTow, Laws, Shape
+from .hanging import HangingTow, Laws, Shape, sum_of
+from .measured_line import scatter_of_x, smooth_line
+from .terms import terms
 from .variant import StripVariant
 
 __all__ = ["Cantilever"]
@@ -42,16 +44,21 @@ LOADS = np.logspace(-2.0, 3.0, 51)
 REACH = 1e3
 #: Steepest slope, as a tangent, at which a distance along the normal stands for a height.
 STEEPEST = 5.0
-#: Degree of the polynomials that smooth a measured line.
-SMOOTH = 5
-#: Readings without arc length from which their scatter is found.
-FEWEST = 12
-#: Sigmas from which a reading is not taken for scatter.
-SPIKE = 4.0
 #: Points of a law that is shown.
 LAW_POINTS = 201
 #: Points on a predicted line among which the nearest to a reading is looked for.
 FINE = 400
+
+PLACE = ("s", "length")
+LAWS: dict[str, tuple[str, tuple[str, ...], bool]] = {
+    "moment": ("moment", ("kappa",), False),
+    "unloaded": ("unloaded", PLACE, False),
+    "slope": ("slope", ("root",), False),
+    "added_moment": ("moment", ("kappa", *PLACE), True),
+    "added_curvature": ("unloaded", PLACE, True),
+    "load": ("load", PLACE, True),
+}
+"""Expressions of a variant: what they give (see Laws), of what, and whether of a place as one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +68,7 @@ class _Specimen:
     Attributes:
         tow: its model.
         specimen: its number.
+        run: its number.
         rows: places of the readings, (n,).
         s, x, z: of the readings [mm], (n,); s is NaN where it is not known.
         upside_down: whether it was turned over in its clamp.
@@ -68,6 +76,7 @@ class _Specimen:
 
     tow: HangingTow
     specimen: int
+    run: int
     rows: npt.NDArray[np.int64]
     s: Array
     x: Array
@@ -95,7 +104,6 @@ class Cantilever:
     quantity = "z_mm"
     notes = ()
     one_curve = None
-    terms = ()
 
     def __init__(
         self,
@@ -135,15 +143,32 @@ class Cantilever:
         self.readings = readings_of(
             measurements, self._observed, covariates, weight=weight, chain=chain
         )
+        self._largest_curvature = curvature
         shares = {"curvature": curvature, "moment": moment}
         self.effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
+
+    @property
+    def terms(self) -> list[Effect]:
+        """Terms without a formula over what the fitted readings reached."""
+        rows = self.readings.fit
+        places = np.concatenate([own.x for own in self._specimens])
+        order = np.concatenate([own.rows for own in self._specimens])
+        x = np.empty_like(places)
+        x[order] = places
+        ranges = {
+            "length": float(self._length[rows].max()),
+            "curvature": self._largest_curvature,
+            "x": float(np.abs(x[rows]).max()),
+            "z": float(np.abs(self._observed[rows]).max()),
+        }
+        return terms(ranges, np.unique(self._run[rows]).tolist())
 
     def _lay_out(self, measurements: Sequence[Measurement]) -> None:
         """Readings in the order of runs, in a run by length and along the strip."""
         tows: dict[tuple[Any, ...], HangingTow] = {}
         table: list[Array] = []
         run_of: list[npt.NDArray[np.int64]] = []
-        keys: list[tuple[int, tuple[Any, ...]]] = []
+        keys: list[tuple[int, int, tuple[Any, ...]]] = []
         specimens = specimens_of(measurements)
         number = 0
         for m in measurements:
@@ -160,7 +185,7 @@ class Cantilever:
                 for length in columns[0]:
                     size = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
                     key = (*size, m.rig.upside_down)
-                    keys.append((specimens[number], key))
+                    keys.append((specimens[number], number, key))
                     if key not in tows:
                         tows[key] = HangingTow(*size)
                 number += 1
@@ -171,13 +196,14 @@ class Cantilever:
             rows = np.array([i for i, other in enumerate(keys) if other == own])
             self._specimens.append(
                 _Specimen(
-                    tows[own[1]],
+                    tows[own[2]],
                     own[0],
+                    own[1],
                     rows,
                     self._arc[rows],
                     x[rows],
                     self._observed[rows],
-                    own[1][-1],
+                    own[2][-1],
                 )
             )
 
@@ -218,7 +244,7 @@ class Cantilever:
         for own in self._specimens:
             for run in np.unique(self._run[own.rows]):
                 mine = self._run[own.rows] == run
-                slope[own.rows[mine]], away = _smooth(own.x[mine], own.z[mine])
+                slope[own.rows[mine]], away = smooth_line(own.x[mine], own.z[mine])
                 if np.isnan(own.s[mine]).all():
                     # The line may not be as smooth as the polynomials: so differences, again.
                     differences.append(away[1:-1] - (away[:-2] + away[2:]) / 2.0)
@@ -227,7 +253,7 @@ class Cantilever:
                     shares.append(part[1:-1] + (part[:-2] + part[2:]) / 4.0)
         if not shares:
             return slope, 1.0
-        return slope, _scatter(np.concatenate(differences), np.concatenate(shares), self.noise)
+        return slope, scatter_of_x(np.concatenate(differences), np.concatenate(shares), self.noise)
 
     def _baseline_lines(self, C1: float) -> tuple[Array, float, float]:
         """Arc length of every reading, and the largest curvature and moment per width."""
@@ -266,7 +292,9 @@ class Cantilever:
             mine = {name: value * factors.get(name, 1.0) for name, value in values.items()}
             key = (id(own.tow), *mine.values())
             shape = shapes[key] = shapes.get(key) or own.tow.solve(mine, laws[own.upside_down])
-            heights, changes = self._heights(own, shape.x, shape.z, shape.slopes)
+            heights, changes = self._heights(own, *self._seen(shape, own, strips, mine))
+            for zeros in (v for v in strips if v.each_run):
+                heights, changes = self._with_zero(own, zeros, values, heights, changes)
             expected[own.rows] = heights
             for name, change in changes.items():
                 slopes[name][own.rows] = change * factors.get(name, 1.0)
@@ -274,6 +302,8 @@ class Cantilever:
 
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law:
         """Moment per width of the curvature beyond that unloaded, up to the largest one reached.
+
+        Where it varies along the strip it is that at the clamp.
 
         Raises:
             SolveError: the model has no solution there.
@@ -286,9 +316,16 @@ class Cantilever:
         ]
         kappa = np.linspace(0.0, max(float(np.abs(s.curvature).max()) for s in shapes), LAW_POINTS)
         per_C1 = self.stiffness_per_C1
+        longest = max(own.tow.length for own in self._specimens)
+        clamp = {
+            "s": Varying(np.zeros(LAW_POINTS)),
+            "length": Varying(np.full(LAW_POINTS, longest)),
+        }
         moment, slopes = values["C1_MPa"] * per_C1 * kappa, {"C1_MPa": per_C1 * kappa}
         for own in laws.moments:
-            added = own({"kappa": Varying(kappa)}, {**values, "B": values["C1_MPa"] * per_C1})
+            added = own(
+                {"kappa": Varying(kappa), **clamp}, {**values, "B": values["C1_MPa"] * per_C1}
+            )
             moment = moment + added["moment"].value
             for name, slope in added["moment"].slopes.items():
                 name, scale = ("C1_MPa", per_C1) if name == "B" else (name, 1.0)
@@ -338,30 +375,85 @@ class Cantilever:
         return at
 
     def _laws(self, variants: Sequence[StripVariant], upside_down: bool) -> Laws:
-        def those(result: str, of: str) -> list[Marched]:
-            mine = (v for v in variants if getattr(v, result) is not None)
-            return [self._law(v, result, of, upside_down) for v in mine]
+        def those(*names: str) -> list[Marched]:
+            mine = ((v, name) for name in names for v in variants if getattr(v, name) is not None)
+            return [self._law(v, name, upside_down) for v, name in mine]
 
         return Laws(
-            moments=those("moment", "kappa"),
-            unloaded=those("unloaded", "kappa"),
-            slopes=those("slope", "root"),
+            moments=those("moment", "added_moment"),
+            unloaded=those("unloaded", "added_curvature"),
+            slopes=those("slope"),
+            loads=those("load"),
         )
 
-    def _law(self, variant: StripVariant, result: str, of: str, upside_down: bool) -> Marched:
+    def _law(self, variant: StripVariant, name: str, upside_down: bool) -> Marched:
         """One of a variant's expressions, with its derivatives.
 
         What belongs to the strip turns over with it: m(κ) becomes -m(-κ) and κ0 becomes -κ0.
         """
-        turned = upside_down and result != "slope"
-        key = (variant, result, turned)
+        turned = upside_down and name not in ("slope", "load")
+        key = (variant, name, turned)
         if key not in self._compiled:
-            law = Marched((of,), ("B", *(p.name for p in variant.parameters)))
+            result, inputs, by_place = LAWS[name]
+            law = Marched(inputs, ("B", *(p.name for p in variant.parameters)))
             sign = -1.0 if turned else 1.0
-            given = (law.at,) if result == "unloaded" else (law.at, sign * law.at[of])
-            expression = sign * getattr(variant, result)(*given)
+            at = {of: sign * law.at[of] if of == "kappa" else law.at[of] for of in inputs}
+            given = (at,) if by_place else tuple(at[of] for of in inputs if of not in PLACE)
+            expression = sign * getattr(variant, name)(law.at, *given)
             self._compiled[key] = law.define({result: expression}, {})
         return self._compiled[key]
+
+    def _with_zero(
+        self,
+        own: _Specimen,
+        variant: StripVariant,
+        values: Mapping[str, float],
+        heights: Array,
+        changes: dict[str, Array],
+    ) -> tuple[Array, dict[str, Array]]:
+        """The same with the zero of the run; of one that is not fitted, what fits best there."""
+        for p in variant.parameters:
+            if p.run == own.run:
+                return heights + values[p.name], {**changes, p.name: np.ones(len(heights))}
+        seen = self.readings.usable[own.rows]
+        if seen.any():
+            heights = heights + np.mean((self._observed[own.rows] - heights)[seen])
+            changes = {name: change - np.mean(change[seen]) for name, change in changes.items()}
+        return heights, changes
+
+    def _seen(
+        self,
+        shape: Shape,
+        own: _Specimen,
+        variants: Sequence[StripVariant],
+        values: Mapping[str, float],
+    ) -> tuple[Array, Array, dict[str, Array]]:
+        """Nodes as the camera sees them: x, z and derivatives, as those of a shape."""
+        cameras = [v for v in variants if v.camera is not None]
+        if not cameras:
+            return shape.x, shape.z, shape.slopes
+        known = {
+            "x": Varying(shape.x, {name: slope[0] for name, slope in shape.slopes.items()}),
+            "z": Varying(shape.z, {name: slope[1] for name, slope in shape.slopes.items()}),
+            "s": Varying(own.tow.arc),
+            "length": Varying(np.full_like(shape.x, own.tow.length)),
+        }
+        for v in cameras:
+            key = (v, "camera", False)
+            if key not in self._compiled:
+                assert v.camera is not None
+                law = Marched(tuple(known), tuple(p.name for p in v.parameters))
+                out, up = v.camera(law.at, law.at)
+                self._compiled[key] = law.define({"x": out, "z": up}, {})
+            added = self._compiled[key](known, values)
+            known |= {k: sum_of((known[k], added[k])) for k in ("x", "z")}
+        x, z = known["x"], known["z"]
+        zero = np.zeros_like(shape.x)
+        slopes = {
+            name: np.stack([v.slopes.get(name, zero) + zero for v in (x, z)])
+            for name in {**x.slopes, **z.slopes}
+        }
+        return x.value, z.value, slopes
 
 
 def _between(at: Array, table: Array, where: float) -> Array:
@@ -371,52 +463,3 @@ def _between(at: Array, table: Array, where: float) -> Array:
         return table[0]
     share = float(np.clip((where - at[k]) / (at[k + 1] - at[k]), 0.0, 1.0))
     return (1.0 - share) * table[k] + share * table[k + 1]
-
-
-def _smooth(x: Array, z: Array) -> tuple[Array, Array]:
-    """Slope of a measured line [rad], and how far its readings are from a smooth one [mm].
-
-    The smooth line leaves the clamp at the origin; x and z are polynomials of the distance from
-    there, which is good enough an arc length for that.
-
-    Args:
-        x: of the readings [mm], (n,).
-        z: of the readings [mm], (n,).
-    """
-    far = np.hypot(x, z)
-    u = far / far.max()
-    degree = int(np.clip(len(x) // 3, 1, SMOOTH))
-    powers = np.arange(1, degree + 1)
-    basis = u[:, None] ** powers
-    fitted = np.linalg.lstsq(basis, np.stack([x, z], axis=1), rcond=None)[0]
-    along = (powers * u[:, None] ** (powers - 1)) @ fitted
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    gap = np.stack([x, z], axis=1) - basis @ fitted
-    away = gap[:, 1] * along[:, 0] - gap[:, 0] * along[:, 1]
-    return np.arctan2(along[:, 1], along[:, 0]), away
-
-
-def _scatter(differences: Array, shares: Array, noise: float | None) -> float:
-    """Scatter of x over that of z, from how readings scatter where the line is steep.
-
-    The largest that is nearly as likely as the likeliest, and no more than one: a scatter that is
-    taken for too small would pass for an effect.
-
-    Args:
-        differences: of distances from a smooth line from the mean of both neighbours' [mm], (n,).
-        shares: of the variance of z and of that of x in their variance, (n, 2).
-        noise: sigma of z [mm] where it is given.
-    """
-    if len(differences) < FEWEST:
-        return 1.0
-
-    def unlikely(ratio: float, sigma: float) -> float:
-        variance = sigma**2 * (shares @ [1.0, ratio**2] + 1e-4)
-        # A spike says nothing of the scatter.
-        return float(np.sum(np.log(variance) + np.minimum(differences**2 / variance, SPIKE**2)))
-
-    typical = 1.5 * float(np.median(np.abs(differences))) + 1e-12
-    sigmas = [noise] if noise else typical * np.logspace(-0.5, 0.5, 31)
-    ratios = np.linspace(0.0, 1.0, 11)
-    cost = np.array([min(unlikely(ratio, sigma) for sigma in sigmas) for ratio in ratios])
-    return float(ratios[cost <= cost.min() + 1.0].max())

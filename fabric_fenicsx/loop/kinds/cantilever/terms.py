@@ -1,0 +1,279 @@
+"""Terms without a formula: what could act on a strip, on its weight or on what the camera sees.
+
+Each is linear, where there is little of it, in the coefficients of a shape over one variable, and
+stands for whatever law of that variable there is. With g such a shape,
+
+    M = B κ e^(−g)        bending: g is a log-flexibility, so that a moment keeps its sign
+    κ0 = g,  w (1 + g)    the curvature of the unloaded strip, and its weight
+    (x, z) + g            what the camera sees
+
+Some are all but a listed effect, and then it depends on the readings whether the two are told
+apart: any odd law of the curvature is near one of nonlinear_bending; a soft stretch at the clamp is
+clamp_compliance; a curvature that does not vary much is residual_curvature; a camera that is turned
+differs from clamp_tilt by as much as a strip bends differently when it is tilted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from ufl import exp, max_value, min_value
+
+from ....inputs.parameters import Parameter
+from ....mechanics.laws.shaped import shape_of
+from ...inference.effects import Effect, Values, of_run
+from .variant import StripVariant
+
+__all__ = ["terms"]
+
+#: Numbers of coefficients of a spline.
+SPLINES = (1, 2)
+#: Where a step, or a bump, may begin to be looked for, as a share of the longest strip.
+STEPS, BUMPS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
+#: How wide they are.
+WIDTH, BUMP_WIDTHS = 0.03, (0.03, 0.1)
+#: Decays from the clamp or from the free end, as shares of it.
+DECAYS = (0.05, 0.2)
+#: Where flexibility is as without a term: about the middle of where strips bend, so that B is
+#: the stiffness there.
+MIDDLE = 0.2
+#: No coefficient is larger: a moment or a weight that is so many times another is none.
+LARGEST = 10.0
+#: Curvatures by which a moment is half way to what it is at large ones, as shares of the largest.
+HALF_WAY = (0.1, 0.6)
+#: Places are seen within this many times the largest reading.
+BEYOND = 1.1
+#: Places are counted from there.
+ENDS = ("clamp", "free end")
+
+Of = Callable[[Values, Any], Any]
+"""An expression of the values of parameters and of a variable."""
+
+Shape = tuple[str, tuple[Parameter, ...], Of]
+"""A shape over one variable: label, parameters, and the expression."""
+
+
+def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
+    """The terms of a cantilever.
+
+    Args:
+        ranges: largest value in the fitted readings of "length", "x", "z" [mm] and of the
+            baseline's "curvature" [1/mm].
+        runs: that are fitted, counted from 0.
+    """
+    return [*_of_the_strip(ranges), *_of_the_camera(ranges), *_of_the_run(runs)]
+
+
+def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
+    longest, bend = ranges["length"], ranges["curvature"]
+
+    name = "bending_moment_of_arc_length"
+    forms = [
+        StripVariant(
+            _from(label, end), parameters, added_moment=partial(_flexible, g, end, longest)
+        )
+        for end in ENDS
+        for label, parameters, g in _along_the_strip(name, end)
+    ]
+    about = "bending stiffness that varies along the strip"
+    yield _term(name, about, "bending_moment", ("arc_length",), forms)
+
+    name = "bending_moment_of_curvature"
+    starts = tuple(bend * share for share in HALF_WAY)
+    half = Parameter(f"{name}_half_1_mm", starts, 0.01 * bend, 10.0 * bend)
+    forms = [
+        StripVariant(label, (*parameters, half), added_moment=partial(_odd, g, half.name))
+        for label, parameters, g in _splines(name, SPLINES)
+    ]
+    yield _term(name, "any odd law of the curvature", "bending_moment", ("curvature",), forms)
+
+    for acts_on, unit, about in (
+        ("rest_curvature", bend, "curvature of the unloaded strip"),
+        ("load", 1.0, "weight"),
+    ):
+        to = "added_curvature" if acts_on == "rest_curvature" else "load"
+        # A weight that is even is no other than B, and a curvature has nothing to stand for it.
+        constant = acts_on == "rest_curvature"
+        name = f"{acts_on}_of_arc_length"
+        forms = [
+            _form(_from(label, end), parameters, to, partial(_of_place, unit, g, end, longest))
+            for end in ENDS
+            for label, parameters, g in _along_the_strip(name, end, constant=constant)
+        ]
+        yield _term(name, f"{about} that varies along the strip", acts_on, ("arc_length",), forms)
+        name = f"{acts_on}_of_length"
+        forms = [
+            _form(label, parameters, to, partial(_of_length, unit, g, longest))
+            for label, parameters, g in _splines(name, SPLINES[:1], constant=constant)
+        ]
+        yield _term(name, f"{about} that goes by the overhang", acts_on, ("length",), forms)
+
+
+def _form(
+    label: str, parameters: tuple[Parameter, ...], to: str, of: Callable[[Values, Values], Any]
+) -> StripVariant:
+    if to == "load":
+        return StripVariant(label, parameters, load=of)
+    return StripVariant(label, parameters, added_curvature=of)
+
+
+def _along(end: str, longest: float, at: Values) -> Any:
+    """A place along the strip, counted from one end, as a share of the longest strip."""
+    place = at["s"] if end == "clamp" else at["length"] - at["s"]
+    return max_value(min_value(place / longest, 1), 0)
+
+
+def _flexible(g: Of, end: str, longest: float, p: Values, at: Values) -> Any:
+    more = g(p, _along(end, longest, at))
+    if end == "clamp":
+        more = more - g(p, MIDDLE)
+    return p["B"] * at["kappa"] * (exp(-more) - 1)
+
+
+def _odd(g: Of, half: str, p: Values, at: Values) -> Any:
+    size = abs(at["kappa"])
+    return p["B"] * at["kappa"] * (exp(-g(p, size / (size + p[half]))) - 1)
+
+
+def _of_place(unit: float, g: Of, end: str, longest: float, p: Values, at: Values) -> Any:
+    return unit * g(p, _along(end, longest, at))
+
+
+def _of_length(unit: float, g: Of, longest: float, p: Values, at: Values) -> Any:
+    return unit * g(p, min_value(at["length"] / longest, 1))
+
+
+# Camera ---------------------------------------------------------------------------------------
+
+
+def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
+    longest = ranges["length"]
+    width, depth = (BEYOND * ranges[name] for name in ("x", "z"))
+
+    def form(label: str, parameters: tuple[Parameter, ...], of: Of, by: str, to: str) -> Any:
+        most = {"x": width, "z": depth, "length": longest}[by]
+        # What is added to a height is a factor of it, or so many times the deepest one.
+        unit = None if to == "scale" else depth
+        camera = partial(_higher, of, by, most, unit)
+        return StripVariant(f"{to}, {label}", parameters, camera=camera)
+
+    name = "reading_of_height"
+    even = _coefficient(f"{name}_0")
+    forms = [form("even", (even,), lambda p, x: p[even.name], "z", "scale")]
+    forms += [form(*shape, "z", "scale") for shape in _splines(name, SPLINES)]
+    yield _term(name, "scale of heights", "reading", ("height",), forms)
+
+    name = "reading_of_distance"
+    turn = Parameter(f"{name}_turn_rad", amplitude=True)
+    forms = [StripVariant("turned", (turn,), camera=partial(_turned, turn.name))]
+    forms += [form(*shape, "x", "scale") for shape in _splines(name, SPLINES)]
+    forms += [form(*shape, "x", "height") for shape in _splines(name, SPLINES[1:])]
+    about = "heights, or their scale, by the distance from the clamp"
+    yield _term(name, about, "reading", ("distance",), forms)
+
+    name = "reading_of_height_and_distance"
+    radial = tuple(Parameter(f"{name}_{of}", amplitude=True) for of in ("x", "z"))
+    camera = partial(_radial, (radial[0].name, radial[1].name), longest)
+    forms = [StripVariant("radial", radial, camera=camera)]
+    about = "scale of the picture by the distance from the clamp in it"
+    yield _term(name, about, "reading", ("height", "distance"), forms)
+
+    name = "reading_of_length"
+    forms = [
+        form(*shape, "length", to)
+        for to in ("scale", "height")
+        for shape in _splines(name, SPLINES[:1])
+    ]
+    yield _term(name, "heights, or their scale, by the overhang", "reading", ("length",), forms)
+
+
+def _of_the_run(runs: Sequence[int]) -> Iterator[Effect]:
+    if len(runs) > 1:
+        name = "reading_of_run"
+        zero = Parameter(f"{name}_zero_mm", amplitude=True)
+        forms = [StripVariant("zero", tuple(of_run(zero, k) for k in runs), each_run=True)]
+        yield _term(name, "a zero of the heights in each run", "reading", ("run",), forms)
+
+
+def _higher(
+    g: Of, by: str, most: float, unit: float | None, p: Values, at: Values
+) -> tuple[Any, Any]:
+    added = g(p, min_value(abs(at[by]) / most, 1))
+    return 0.0, added * (at["z"] if unit is None else unit)
+
+
+def _turned(turn: str, p: Values, at: Values) -> tuple[Any, Any]:
+    return -p[turn] * at["z"], p[turn] * at["x"]
+
+
+def _radial(names: tuple[str, str], longest: float, p: Values, at: Values) -> tuple[Any, Any]:
+    square = (at["x"] ** 2 + at["z"] ** 2) / longest**2
+    return p[names[0]] * at["x"] * square, p[names[1]] * at["z"] * square
+
+
+def _term(
+    name: str, about: str, acts_on: str, depends_on: tuple[str, ...], forms: Iterable[StripVariant]
+) -> Effect:
+    return Effect(
+        name,
+        "cantilever",
+        about,
+        tuple(forms),
+        of_fabric=acts_on == "bending_moment",
+        acts_on=acts_on,
+        depends_on=depends_on,
+    )
+
+
+def _from(label: str, end: str) -> str:
+    return f"{label}, from the {end}"
+
+
+# Shapes ---------------------------------------------------------------------------------------
+
+
+def _splines(name: str, counts: Iterable[int], *, constant: bool = False) -> Iterator[Shape]:
+    """Splines that are 0 at 0, or with a constant of their own."""
+    zero = (_coefficient(f"{name}_0"),) if constant else ()
+    for count in counts:
+        own = tuple(_coefficient(f"{name}_{k + 1}") for k in range(count))
+
+        def spline(p: Values, x: Any, own: Any = own) -> Any:
+            return sum(p[c.name] for c in zero) + _shape("spline", p, own, None, None, x)
+
+        yield f"{count} coefficients" if count > 1 else "linear", (*zero, *own), spline
+
+
+def _along_the_strip(name: str, end: str, *, constant: bool = False) -> Iterator[Shape]:
+    """Shapes over a place that is counted from one end."""
+    yield from _splines(name, SPLINES if end == "clamp" else SPLINES[:1], constant=constant)
+    one = _coefficient(f"{name}_1")
+    decay = Parameter(f"{name}_width", DECAYS, 0.02, 1.0)
+    yield "decay", (one, decay), lambda p, x: p[one.name] * exp(-x / p[decay.name])
+    if end != "clamp":
+        # Nothing much bends there: a place of its own would hardly be known.
+        return
+    place = Parameter(f"{name}_place", STEPS, 0.0, 1.0)
+    width = Parameter(f"{name}_width", (WIDTH,), 0.01, 0.3)
+    yield (
+        "step",
+        (one, place, width),
+        lambda p, x: _shape("step", p, (one,), p[place.name], p[width.name], x),
+    )
+    about = Parameter(f"{name}_place", BUMPS, 0.0, 1.0)
+    wide = Parameter(f"{name}_width", BUMP_WIDTHS, 0.02, 0.4)
+    yield (
+        "bump",
+        (one, about, wide),
+        lambda p, x: p[one.name] * exp(-(((x - p[about.name]) / p[wide.name]) ** 2)),
+    )
+
+
+def _coefficient(name: str) -> Parameter:
+    return Parameter(name, lower=-LARGEST, upper=LARGEST, amplitude=True)
+
+
+def _shape(kind: str, p: Values, own: Iterable[Parameter], place: Any, width: Any, x: Any) -> Any:
+    return shape_of(kind, tuple(p[c.name] for c in own), x, place, width)
