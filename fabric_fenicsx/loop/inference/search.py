@@ -176,8 +176,7 @@ class _Search:
         nearest = _nearest(levels)
         final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
         if final.effects:
-            averaged = self.judge.averaged(final)
-            final = self._again(final, averaged, CRITERIA.final_evaluations)
+            final = self._last(final)
         self.progress(0.9, "rivals")
         judged = final if verdict != "unexplained" else nearest
         misfit = self.judge.misfit(judged)
@@ -398,6 +397,13 @@ class _Search:
         )
         return self.judge.weighed(found, model.effects, thorough=True)
 
+    def _last(self, model: Model) -> Model:
+        """A model fitted to the end; the old one where there is no solution on the way."""
+        try:
+            return self._again(model, self.judge.averaged(model), CRITERIA.final_evaluations)
+        except SolveError:
+            return model
+
     def _best_refined(self, models: list[Model]) -> list[Model]:
         """Models, the best first; the best of each set of effects was fitted again.
 
@@ -505,7 +511,7 @@ class _Search:
         loses = model.criterion - final.criterion
         if own.listed or loses > REFINED_WITHIN:
             return loses < CRITERIA.decisive
-        model = self._again(model, self.judge.averaged(model), CRITERIA.final_evaluations)
+        model = self._last(model)
         loses = model.criterion - final.criterion
         mine, other = (m.fit.rms(m.fit.used) for m in (final, model))
         alike = other < CRITERIA.as_little * mine

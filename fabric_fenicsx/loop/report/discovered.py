@@ -62,6 +62,9 @@ def discovered_terms(d: Diagnosis, first: int = 1) -> list[Discovered]:
     found: list[Discovered] = []
     for effect in (e for e in d.effects if not e.listed):
         variant = next(v for v in d.final.variants if v in effect.variants)
+        if variant.shape is None:
+            # A number of each run is no shape, and no other data have these runs.
+            continue
         table = _shape_table(d, variant)
         about = effect.acts_on.replace("_", " ") + ": "
         if table.columns[1].startswith("share_of_"):

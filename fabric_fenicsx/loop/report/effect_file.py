@@ -87,6 +87,21 @@ EFFECTS = [
 '''
 
 
+OF_A_STRIP = """
+import fabric_fenicsx as ff
+
+EFFECTS = [
+    ff.strip_term(
+        "{name}",
+        term="{term}",
+        form="{form}",
+        ranges={ranges!r},
+        values={values!r},
+    )
+]
+"""
+
+
 def effect_file(term: Discovered, titles: str) -> str:
     """The text of a term's file.
 
@@ -108,6 +123,11 @@ def effect_file(term: Discovered, titles: str) -> str:
         "y": shape.y,
         "acts_on": term.effect.acts_on,
     }
+    if term.effect.test == "cantilever":
+        values = {p.name: term.values[p.name] for p in term.variant.parameters}
+        ranges = shape.fixed["ranges"]
+        form = {"term": term.effect.name, "form": term.variant.label}
+        return (HEAD + OF_A_STRIP).format(values=values, ranges=ranges, **form, **words)
     numbers = {name: _valued(n, term.values) for name, n in shape.fixed.items()}
     if "base" in numbers:
         if numbers["base"] == "elastic":

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -147,14 +148,10 @@ class Cantilever:
         shares = {"curvature": curvature, "moment": moment}
         self.effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
 
-    @property
+    @cached_property
     def terms(self) -> list[Effect]:
         """Terms without a formula over what the fitted readings reached."""
-        rows = self.readings.fit
-        places = np.concatenate([own.x for own in self._specimens])
-        order = np.concatenate([own.rows for own in self._specimens])
-        x = np.empty_like(places)
-        x[order] = places
+        rows, x = self.readings.fit, self._distance
         ranges = {
             "length": float(self._length[rows].max()),
             "curvature": self._largest_curvature,
@@ -162,6 +159,14 @@ class Cantilever:
             "z": float(np.abs(self._observed[rows]).max()),
         }
         return terms(ranges, np.unique(self._run[rows]).tolist())
+
+    @property
+    def _distance(self) -> Array:
+        """Of the readings from the clamp [mm]."""
+        x = np.empty(len(self._run))
+        for own in self._specimens:
+            x[own.rows] = own.x
+        return x
 
     def _lay_out(self, measurements: Sequence[Measurement]) -> None:
         """Readings in the order of runs, in a run by length and along the strip."""
@@ -271,8 +276,18 @@ class Cantilever:
     # Prediction ---------------------------------------------------------------------------
 
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
-        """Nothing: there are no such terms of a cantilever."""
-        raise NotImplementedError(variant.label)
+        """What a term without a formula depends on, at every reading; see Experiment."""
+        arc = self.readings.covariates["arc length [mm]"]
+        known = {
+            "arc_length_mm": arc,
+            "from_the_free_end_mm": self._length - arc,
+            "length_mm": self._length,
+            "distance_mm": self._distance,
+            "from_the_clamp_mm": np.hypot(self._distance, self._observed),
+            "height_mm": np.abs(self._observed),
+        }
+        # Of the curvature there are no readings, nor of the number of a run.
+        return known.get(variant.shape.x if variant.shape else "", arc)
 
     def predict(
         self,

@@ -16,6 +16,7 @@ differs from clamp_tilt by as much as a strip bends differently when it is tilte
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -23,10 +24,10 @@ from ufl import exp, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import shape_of
-from ...inference.effects import Effect, Values, of_run
+from ...inference.effects import Effect, Shape, Values, of_run
 from .variant import StripVariant
 
-__all__ = ["terms"]
+__all__ = ["strip_term", "terms"]
 
 #: Numbers of coefficients of a spline.
 SPLINES = (1, 2)
@@ -51,7 +52,7 @@ ENDS = ("clamp", "free end")
 Of = Callable[[Values, Any], Any]
 """An expression of the values of parameters and of a variable."""
 
-Shape = tuple[str, tuple[Parameter, ...], Of]
+Drawn = tuple[str, tuple[Parameter, ...], Of]
 """A shape over one variable: label, parameters, and the expression."""
 
 
@@ -63,7 +64,59 @@ def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
             baseline's "curvature" [1/mm].
         runs: that are fitted, counted from 0.
     """
-    return [*_of_the_strip(ranges), *_of_the_camera(ranges), *_of_the_run(runs)]
+    found = [*_of_the_strip(ranges), *_of_the_camera(ranges)]
+    return [*(_with_ranges(term, ranges) for term in found), *_of_the_run(runs)]
+
+
+def _with_ranges(term: Effect, ranges: Mapping[str, float]) -> Effect:
+    """A term that can be made again from what is known of its shapes."""
+    fixed = {"ranges": dict(ranges)}
+    forms = [
+        v if v.shape is None else replace(v, shape=replace(v.shape, fixed=fixed))
+        for v in term.variants
+    ]
+    return replace(term, variants=tuple(forms))
+
+
+def strip_term(
+    name: str, *, term: str, form: str, ranges: Mapping[str, float], values: Mapping[str, float]
+) -> Effect:
+    """A term that was found in strips, as an effect: so many times what it was there.
+
+    Args:
+        name: of the effect.
+        term: which it is.
+        form: its label.
+        ranges: see ``terms``.
+        values: of its parameters, as they were found.
+
+    Raises:
+        ValueError: there is no such form.
+    """
+    of = {effect.name: effect for effect in terms(ranges, ())}
+    forms = {v.label: v for v in of[term].variants} if term in of else {}
+    if form not in forms:
+        raise ValueError(f"{term}, {form}: no such term of a strip")
+    own = forms[form]
+    assert isinstance(own, StripVariant)
+    amount = Parameter(f"{name}_amount", amplitude=True, meaning="1 as it was found")
+
+    def found(p: Values) -> dict[str, Any]:
+        strengths = {a.name: p[amount.name] * values[a.name] for a in own.amplitudes}
+        return {**p, **values, **strengths}
+
+    def made(f: Callable[[Values, Values], Any] | None) -> Any:
+        return None if f is None else lambda p, at: f(found(p), at)
+
+    variant = StripVariant(
+        "as found",
+        (amount,),
+        added_moment=made(own.added_moment),
+        added_curvature=made(own.added_curvature),
+        load=made(own.load),
+        camera=made(own.camera),
+    )
+    return Effect(name, "cantilever", of[term].meaning, (variant,), of[term].of_fabric)
 
 
 def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
@@ -72,7 +125,10 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
     name = "bending_moment_of_arc_length"
     forms = [
         StripVariant(
-            _from(label, end), parameters, added_moment=partial(_flexible, g, end, longest)
+            _from(label, end),
+            parameters,
+            Shape(X[end], "log_flexibility", longest, partial(_centred, g, end)),
+            added_moment=partial(_flexible, g, end, longest),
         )
         for end in ENDS
         for label, parameters, g in _along_the_strip(name, end)
@@ -84,7 +140,12 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
     starts = tuple(bend * share for share in HALF_WAY)
     half = Parameter(f"{name}_half_1_mm", starts, 0.01 * bend, 10.0 * bend)
     forms = [
-        StripVariant(label, (*parameters, half), added_moment=partial(_odd, g, half.name))
+        StripVariant(
+            label,
+            (*parameters, half),
+            Shape("curvature_1_mm", "log_flexibility", bend, partial(_by_size, g, half.name, bend)),
+            added_moment=partial(_odd, g, half.name),
+        )
         for label, parameters, g in _splines(name, SPLINES)
     ]
     yield _term(name, "any odd law of the curvature", "bending_moment", ("curvature",), forms)
@@ -98,25 +159,59 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         constant = acts_on == "rest_curvature"
         name = f"{acts_on}_of_arc_length"
         forms = [
-            _form(_from(label, end), parameters, to, partial(_of_place, unit, g, end, longest))
+            _form(
+                _from(label, end),
+                parameters,
+                Shape(X[end], Y[acts_on], longest, partial(_times, unit, g)),
+                to,
+                partial(_of_place, unit, g, end, longest),
+            )
             for end in ENDS
             for label, parameters, g in _along_the_strip(name, end, constant=constant)
         ]
         yield _term(name, f"{about} that varies along the strip", acts_on, ("arc_length",), forms)
         name = f"{acts_on}_of_length"
         forms = [
-            _form(label, parameters, to, partial(_of_length, unit, g, longest))
+            _form(
+                label,
+                parameters,
+                Shape("length_mm", Y[acts_on], longest, partial(_times, unit, g)),
+                to,
+                partial(_of_length, unit, g, longest),
+            )
             for label, parameters, g in _splines(name, SPLINES[:1], constant=constant)
         ]
         yield _term(name, f"{about} that goes by the overhang", acts_on, ("length",), forms)
 
 
+X = {"clamp": "arc_length_mm", "free end": "from_the_free_end_mm"}
+Y = {"rest_curvature": "rest_curvature_1_mm", "load": "share_of_weight"}
+"""Variables and what is added, with units."""
+
+
 def _form(
-    label: str, parameters: tuple[Parameter, ...], to: str, of: Callable[[Values, Values], Any]
+    label: str,
+    parameters: tuple[Parameter, ...],
+    shape: Shape,
+    to: str,
+    of: Callable[[Values, Values], Any],
 ) -> StripVariant:
     if to == "load":
-        return StripVariant(label, parameters, load=of)
-    return StripVariant(label, parameters, added_curvature=of)
+        return StripVariant(label, parameters, shape, load=of)
+    return StripVariant(label, parameters, shape, added_curvature=of)
+
+
+def _times(unit: float, g: Of, p: Values, x: Any) -> Any:
+    return unit * g(p, x)
+
+
+def _centred(g: Of, end: str, p: Values, x: Any) -> Any:
+    """Log-flexibility, nothing where B is the stiffness."""
+    return g(p, x) - g(p, MIDDLE) if end == "clamp" else g(p, x)
+
+
+def _by_size(g: Of, half: str, bend: float, p: Values, x: Any) -> Any:
+    return g(p, bend * x / (bend * x + p[half]))
 
 
 def _along(end: str, longest: float, at: Values) -> Any:
@@ -126,9 +221,7 @@ def _along(end: str, longest: float, at: Values) -> Any:
 
 
 def _flexible(g: Of, end: str, longest: float, p: Values, at: Values) -> Any:
-    more = g(p, _along(end, longest, at))
-    if end == "clamp":
-        more = more - g(p, MIDDLE)
+    more = _centred(g, end, p, _along(end, longest, at))
     return p["B"] * at["kappa"] * (exp(-more) - 1)
 
 
@@ -157,7 +250,10 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         # What is added to a height is a factor of it, or so many times the deepest one.
         unit = None if to == "scale" else depth
         camera = partial(_higher, of, by, most, unit)
-        return StripVariant(f"{to}, {label}", parameters, camera=camera)
+        y = "share_of_height" if unit is None else "height_mm"
+        names = {"x": "distance_mm", "z": "height_mm", "length": "length_mm"}
+        shape = Shape(names[by], y, most, partial(_times, unit or 1.0, of))
+        return StripVariant(f"{to}, {label}", parameters, shape, camera=camera)
 
     name = "reading_of_height"
     even = _coefficient(f"{name}_0")
@@ -167,7 +263,8 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
 
     name = "reading_of_distance"
     turn = Parameter(f"{name}_turn_rad", amplitude=True)
-    forms = [StripVariant("turned", (turn,), camera=partial(_turned, turn.name))]
+    shape = Shape("distance_mm", "height_mm", width, lambda p, x: p[turn.name] * width * x)
+    forms = [StripVariant("turned", (turn,), shape, camera=partial(_turned, turn.name))]
     forms += [form(*shape, "x", "scale") for shape in _splines(name, SPLINES)]
     forms += [form(*shape, "x", "height") for shape in _splines(name, SPLINES[1:])]
     about = "heights, or their scale, by the distance from the clamp"
@@ -176,7 +273,9 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     name = "reading_of_height_and_distance"
     radial = tuple(Parameter(f"{name}_{of}", amplitude=True) for of in ("x", "z"))
     camera = partial(_radial, (radial[0].name, radial[1].name), longest)
-    forms = [StripVariant("radial", radial, camera=camera)]
+    by_z = radial[1].name
+    shape = Shape("from_the_clamp_mm", "share_of_height", longest, lambda p, x: p[by_z] * x**2)
+    forms = [StripVariant("radial", radial, shape, camera=camera)]
     about = "scale of the picture by the distance from the clamp in it"
     yield _term(name, about, "reading", ("height", "distance"), forms)
 
@@ -234,7 +333,7 @@ def _from(label: str, end: str) -> str:
 # Shapes ---------------------------------------------------------------------------------------
 
 
-def _splines(name: str, counts: Iterable[int], *, constant: bool = False) -> Iterator[Shape]:
+def _splines(name: str, counts: Iterable[int], *, constant: bool = False) -> Iterator[Drawn]:
     """Splines that are 0 at 0, or with a constant of their own."""
     zero = (_coefficient(f"{name}_0"),) if constant else ()
     for count in counts:
@@ -246,7 +345,7 @@ def _splines(name: str, counts: Iterable[int], *, constant: bool = False) -> Ite
         yield f"{count} coefficients" if count > 1 else "linear", (*zero, *own), spline
 
 
-def _along_the_strip(name: str, end: str, *, constant: bool = False) -> Iterator[Shape]:
+def _along_the_strip(name: str, end: str, *, constant: bool = False) -> Iterator[Drawn]:
     """Shapes over a place that is counted from one end."""
     yield from _splines(name, SPLINES if end == "clamp" else SPLINES[:1], constant=constant)
     one = _coefficient(f"{name}_1")
