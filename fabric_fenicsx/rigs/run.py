@@ -101,7 +101,8 @@ def run(
         tuple(laws),
     )
     further = 0 if not uncertainty or found is None else spread(found).axes.shape[1]
-    session.progress = lambda done, *step: progress(done / (1 + further), *step)
+    if further:
+        session.progress = lambda done, *step: progress(done / (1 + further), *step)
     result = rig(case.test).run(whole, session)
     if found is not None:
         result["fabric"] = {"file": str(base / str(case.fabric)), **taken(found)}

@@ -49,7 +49,7 @@ class Variant:
 
     label: str
     parameters: tuple[Parameter, ...]
-    shape: Shape | None = None
+    shape: Shape | None = field(default=None, kw_only=True)
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:

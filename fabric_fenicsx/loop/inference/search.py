@@ -395,7 +395,7 @@ class _Search:
             deviations=model.fit.deviations,
             evaluations=evaluations,
         )
-        return self.judge.weighed(found, model.effects, thorough=True)
+        return self.judge.weighed(found, model.effects)
 
     def _last(self, model: Model) -> Model:
         """A model fitted to the end; the old one where there is no solution on the way."""

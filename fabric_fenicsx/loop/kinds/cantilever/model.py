@@ -275,6 +275,18 @@ class Cantilever:
 
     # Prediction ---------------------------------------------------------------------------
 
+    def _reached(self, variants: Sequence[StripVariant], values: Mapping[str, float]) -> float:
+        """Largest curvature of the strips [1/mm]."""
+        try:
+            shapes = [
+                own.tow.solve(values, self._laws(variants, own.upside_down), slopes=False)
+                for own in self._specimens
+            ]
+        except SolveError:
+            # From where the strips were left last there may be no way; the baseline's is near.
+            return self._largest_curvature
+        return max(float(np.abs(shape.curvature).max()) for shape in shapes)
+
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """What a term without a formula depends on, at every reading; see Experiment."""
         arc = self.readings.covariates["arc length [mm]"]
@@ -319,17 +331,10 @@ class Cantilever:
         """Moment per width of the curvature beyond that unloaded, up to the largest one reached.
 
         Where it varies along the strip it is that at the clamp.
-
-        Raises:
-            SolveError: the model has no solution there.
         """
         mine = [v for v in variants if isinstance(v, StripVariant)]
         laws = self._laws(mine, False)
-        shapes = [
-            own.tow.solve(values, self._laws(mine, own.upside_down), slopes=False)
-            for own in self._specimens
-        ]
-        kappa = np.linspace(0.0, max(float(np.abs(s.curvature).max()) for s in shapes), LAW_POINTS)
+        kappa = np.linspace(0.0, self._reached(mine, values), LAW_POINTS)
         per_C1 = self.stiffness_per_C1
         longest = max(own.tow.length for own in self._specimens)
         clamp = {

@@ -127,7 +127,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         StripVariant(
             _from(label, end),
             parameters,
-            Shape(X[end], "log_flexibility", longest, partial(_centred, g, end)),
+            shape=Shape(X[end], "log_flexibility", longest, partial(_centred, g, end)),
             added_moment=partial(_flexible, g, end, longest),
         )
         for end in ENDS
@@ -143,7 +143,9 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         StripVariant(
             label,
             (*parameters, half),
-            Shape("curvature_1_mm", "log_flexibility", bend, partial(_by_size, g, half.name, bend)),
+            shape=Shape(
+                "curvature_1_mm", "log_flexibility", bend, partial(_by_size, g, half.name, bend)
+            ),
             added_moment=partial(_odd, g, half.name),
         )
         for label, parameters, g in _splines(name, SPLINES)
@@ -197,8 +199,8 @@ def _form(
     of: Callable[[Values, Values], Any],
 ) -> StripVariant:
     if to == "load":
-        return StripVariant(label, parameters, shape, load=of)
-    return StripVariant(label, parameters, shape, added_curvature=of)
+        return StripVariant(label, parameters, shape=shape, load=of)
+    return StripVariant(label, parameters, shape=shape, added_curvature=of)
 
 
 def _times(unit: float, g: Of, p: Values, x: Any) -> Any:
@@ -253,7 +255,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         y = "share_of_height" if unit is None else "height_mm"
         names = {"x": "distance_mm", "z": "height_mm", "length": "length_mm"}
         shape = Shape(names[by], y, most, partial(_times, unit or 1.0, of))
-        return StripVariant(f"{to}, {label}", parameters, shape, camera=camera)
+        return StripVariant(f"{to}, {label}", parameters, shape=shape, camera=camera)
 
     name = "reading_of_height"
     even = _coefficient(f"{name}_0")
@@ -264,7 +266,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     name = "reading_of_distance"
     turn = Parameter(f"{name}_turn_rad", amplitude=True)
     shape = Shape("distance_mm", "height_mm", width, lambda p, x: p[turn.name] * width * x)
-    forms = [StripVariant("turned", (turn,), shape, camera=partial(_turned, turn.name))]
+    forms = [StripVariant("turned", (turn,), shape=shape, camera=partial(_turned, turn.name))]
     forms += [form(*shape, "x", "scale") for shape in _splines(name, SPLINES)]
     forms += [form(*shape, "x", "height") for shape in _splines(name, SPLINES[1:])]
     about = "heights, or their scale, by the distance from the clamp"
@@ -275,7 +277,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     camera = partial(_radial, (radial[0].name, radial[1].name), longest)
     by_z = radial[1].name
     shape = Shape("from_the_clamp_mm", "share_of_height", longest, lambda p, x: p[by_z] * x**2)
-    forms = [StripVariant("radial", radial, shape, camera=camera)]
+    forms = [StripVariant("radial", radial, shape=shape, camera=camera)]
     about = "scale of the picture by the distance from the clamp in it"
     yield _term(name, about, "reading", ("height", "distance"), forms)
 

@@ -131,7 +131,7 @@ def _laws(
         yield FrameVariant(
             f"{variable.replace('_', ' ')}, {label}" + (", smooth" if base == "smooth" else ""),
             tuple(sorted(parameters, key=lambda p: not p.amplitude)),
-            Shape(X[variable], Y[base], largest[variable], partial(_factor, own), own),
+            shape=Shape(X[variable], Y[base], largest[variable], partial(_factor, own), own),
             laws=partial(_law, own),
             of_baseline=of_baseline,
         )
@@ -236,7 +236,7 @@ def _of_rig(acts_on: str, name: str, variable: str, reach: float) -> Iterator[Fr
         yield FrameVariant(
             label,
             (*coefficients, *(n for n in numbers if isinstance(n, Parameter))),
-            Shape(X[variable], Y[acts_on], reach, value, own | {"variable": variable}),
+            shape=Shape(X[variable], Y[acts_on], reach, value, own | {"variable": variable}),
             of=(variable,),
             added_reading=at_reading if acts_on == "reading" else None,
             added_travel=at_reading if acts_on == "travel" else None,
