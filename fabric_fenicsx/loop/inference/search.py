@@ -7,6 +7,9 @@
 Of the models whose criterion comes near the best one's the one of fewest effects is taken. Its
 amplitudes must be significant, stretches that are left out must be predicted better with it than
 with fewer effects, and what it leaves must be noise: else nothing is claimed.
+
+Where no effect with a name accounts for the fitted readings the same is done with terms without a
+formula beside them: what acts on what, and by what does it go?
 """
 
 from __future__ import annotations
@@ -70,7 +73,6 @@ def diagnose_test(
     if names is not None or found.curve is not None or not experiment.terms:
         return found
     if not search.accounted:
-        # Nothing that has a name will do: what acts on what, and by what does it go?
         return _beside(_Search(experiment, [*listed, *experiment.terms], progress).run(), found)
     if search.effects_needed < 2:
         return found

@@ -47,7 +47,8 @@ def terms(ranges: Mapping[str, float]) -> list[Effect]:
 
     Args:
         ranges: largest value in the fitted readings of "angle", "rate", "path" [rad], "time" [s],
-            "displacement" [mm], "speed" [mm/s], "force" [N].
+            "displacement" [mm], "speed" [mm/s], "acceleration" [mm/s²], "force" [N] and of its
+            change, "force_rate" [N/s].
     """
     largest = dict(ranges)
     largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
@@ -75,15 +76,26 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             alike = ("dissipative", "smooth") if base == "dissipative" else (base,)
             forms = [f for b in alike for v in own for f in _laws(name, b, v, largest)]
             depends_on = (reported, *also.get(base, ()))
-            about = f"{base.replace('_', ' ')} moment, by {reported.replace('_', ' ')}"
             yield Effect(
-                name, "picture_frame", about, tuple(forms), acts_on="moment", depends_on=depends_on
+                name,
+                "picture_frame",
+                f"{base.replace('_', ' ')} moment, by {reported.replace('_', ' ')}",
+                tuple(forms),
+                # A weave's law is odd.
+                of_fabric=not base.startswith("even"),
+                acts_on="moment",
+                depends_on=depends_on,
             )
 
 
 X = {
     "angle": "shear_angle_rad",
+    "largest_angle": "largest_angle_rad",
+    "recent_angle": "recent_angle_rad",
+    "recent_largest_angle": "recent_largest_angle_rad",
+    "path": "path_rad",
     "rate": "shear_rate_rad_s",
+    "recent_rate": "recent_rate_rad_s",
     "unloading": "unloading",
     "time": "time_s",
     "displacement": "displacement_mm",
@@ -91,16 +103,15 @@ X = {
     "acceleration": "acceleration_mm_s2",
     "force": "force_N",
     "force_rate": "force_rate_N_s",
-    "recent_rate": "recent_rate_rad_s",
-} | {name: f"{name}_rad" for name in ("largest_angle", "path", "recent_angle")}
-X["recent_largest_angle"] = "recent_largest_angle_rad"
+}
 """Variables with their units."""
 
-Y = {"elastic": "share_of_elastic_moment", "viscous": "moment_per_rate_N_s"}
-Y |= dict.fromkeys(
-    ("dissipative", "smooth", "odd", "even", "odd_in_rate", "even_in_rate"), "moment_N"
-)
-Y |= {"reading": "reading_N", "travel": "travel_mm"}
+Y = {
+    "elastic": "share_of_elastic_moment",
+    "viscous": "moment_per_rate_N_s",
+    "reading": "reading_N",
+    "travel": "travel_mm",
+}
 """What a term is a factor of, or adds, with units."""
 
 
@@ -131,7 +142,9 @@ def _laws(
         yield FrameVariant(
             f"{variable.replace('_', ' ')}, {label}" + (", smooth" if base == "smooth" else ""),
             tuple(sorted(parameters, key=lambda p: not p.amplitude)),
-            shape=Shape(X[variable], Y[base], largest[variable], partial(_factor, own), own),
+            shape=Shape(
+                X[variable], Y.get(base, "moment_N"), largest[variable], partial(_factor, own), own
+            ),
             laws=partial(_law, own),
             of_baseline=of_baseline,
         )
@@ -167,7 +180,12 @@ def _wealth(variable: str) -> int:
 
 
 def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
-    """Shapes over one variable: label, coefficients, other numbers of the shape."""
+    """Shapes over one variable: label, coefficients, other numbers of the shape.
+
+    Args:
+        name: of the term, with which its parameters begin.
+        wealth: how many of the splines; one alone is the line, all have every other shape too.
+    """
     for count in SPLINES[:wealth]:
         own = tuple(Parameter(f"{name}_{k + 1}", amplitude=True) for k in range(count))
         yield f"{count} coefficients" if count > 1 else "linear", own, {"shape": "spline"}
