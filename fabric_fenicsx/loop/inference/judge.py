@@ -93,6 +93,8 @@ class Judge:
     Attributes:
         outliers: readings that are left out, (n,).
         given: one sigma of a reading as it was stated; None where it was not.
+        compared: whether criteria are of the largest likelihood; see estimate. Terms without a
+            formula, which come in many coefficients, are only alike by that.
     """
 
     def __init__(self, experiment: Experiment, effects: list[Effect]) -> None:
@@ -100,6 +102,7 @@ class Judge:
         self._effects = effects
         self.outliers: Flags = np.zeros(len(self._readings.observed), dtype=bool)
         self.given = experiment.noise
+        self.compared = any(not effect.listed for effect in effects)
         several = len(np.unique(self._readings.folder[self._readings.fit])) > 1
         self._usual = CRITERIA.laboratories if several else CRITERIA.usual_scatter
         self._misfits: dict[Fit, Misfit] = {}
@@ -129,14 +132,14 @@ class Judge:
 
     # Comparison ---------------------------------------------------------------------------
 
-    def components(self, model: Fit, *, smooth: bool = False, thorough: bool = False) -> Estimate:
+    def components(self, model: Fit, *, smooth: bool = False, compared: bool = False) -> Estimate:
         """Variance components of a fitted model; see estimate."""
         return estimate(
             linearised(self._experiment, model),
             model.variances,
             given=self.given,
             smooth=smooth,
-            thorough=thorough,
+            compared=compared,
             usual_scatter=self._usual,
         )
 
@@ -149,9 +152,9 @@ class Judge:
             usual_scatter=self._usual,
         )
 
-    def weighed(self, model: Fit, effects: tuple[Effect, ...], *, thorough: bool = False) -> Model:
-        """A fitted model with its variance components and criterion; see estimate."""
-        found = self.components(model, thorough=thorough)
+    def weighed(self, model: Fit, effects: tuple[Effect, ...]) -> Model:
+        """A fitted model with its variance components and criterion."""
+        found = self.components(model, compared=self.compared)
         return Model(model, effects, found, found.likelihood + self.cost(model, effects))
 
     def cost(self, model: Fit, effects: tuple[Effect, ...]) -> float:

@@ -79,12 +79,10 @@ def diagnose_test(
     # Several effects with names may imitate a single one that has none.
     single = _Search(experiment, experiment.terms, progress, most=1)
     other = single.run()
-    if (
-        single.accounted
-        and single.effects_needed == 1
-        and other.criterion_after < found.criterion_after + CRITERIA.decisive
-    ):
-        if found.criterion_after < other.criterion_after + CRITERIA.decisive:
+    search.judge.compared = True
+    gain = search.judge.weighed(found.final, found.effects).criterion - other.criterion_after
+    if single.accounted and single.effects_needed == 1 and gain > -CRITERIA.decisive:
+        if gain < CRITERIA.decisive:
             for names_of in other.rivals.values():
                 names_of += [effect.name for effect in found.effects]
         return _beside(other, found)

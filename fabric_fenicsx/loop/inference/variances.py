@@ -91,7 +91,7 @@ class Estimate:
         variances: the components.
         smooth: ω of the module's docstring.
         restricted: −2 log restricted likelihood, priors included.
-        likelihood: −2 log likelihood, priors included.
+        likelihood: −2 log likelihood, priors included; see ``estimate``.
         white: what is left, white, with the specimens' deviations but no smooth line, (n,).
     """
 
@@ -108,7 +108,7 @@ def estimate(
     *,
     given: float | None = None,
     smooth: bool = False,
-    thorough: bool = False,
+    compared: bool = False,
     usual_scatter: float = CRITERIA.usual_scatter,
 ) -> Estimate:
     """Variance components with the largest restricted likelihood.
@@ -119,8 +119,8 @@ def estimate(
         given: one sigma of a reading as it was stated; it may be wrong, but not by much.
         smooth: whether a smooth line through each run is allowed for, so that what a model misses
             does not count as noise.
-        thorough: whether it is begun from specimens that are alike as well: there may be more than
-            one maximum.
+        compared: whether the likelihood is to be the largest there is, as models are compared by,
+            rather than that with these components.
         usual_scatter: of specimens, as a share: sigma of a half-normal prior of every τ.
     """
     problem = _Problem(at, given, smooth, usual_scatter)
@@ -135,24 +135,20 @@ def estimate(
     bounds += [(0.0, np.inf)] * (len(groups) + smooth)
     x0 = np.clip(begin, [low for low, _ in bounds], [high for _, high in bounds])
     problem.origin = problem.cost(x0)[0]
-    begins = [x0]
-    if thorough and groups:
-        alike = x0.copy()
-        alike[3 : 3 + len(groups)] = HARDLY
-        begins.append(alike)
-    tried = [
-        minimize(
-            problem.with_slope,
-            begin,
-            method="L-BFGS-B",
-            jac=True,
-            bounds=bounds,
-            options={"maxiter": 60, "ftol": ENOUGH},
-        )
-        for begin in begins
-    ]
-    found = min(tried, key=lambda one: float(one.fun))
+    options = {"maxiter": 60, "ftol": ENOUGH}
+    found = minimize(
+        problem.with_slope, x0, method="L-BFGS-B", jac=True, bounds=bounds, options=options
+    )
     restricted, likelihood = problem.cost(found.x)
+    if compared and groups:
+        # With the components that are likeliest by the likelihood itself, from others.
+        problem.of, problem.origin = 1, likelihood
+        alike = found.x.copy()
+        alike[3 : 3 + len(groups)] = HARDLY
+        other = minimize(
+            problem.with_slope, alike, method="L-BFGS-B", jac=True, bounds=bounds, options=options
+        )
+        likelihood = min(likelihood, problem.cost(other.x)[1])
     noise, taus, omega = problem.split(found.x)
     variances = Variances(noise, dict(zip(groups, taus.tolist(), strict=True)))
     return Estimate(variances, omega, restricted, likelihood, problem.white(found.x))
@@ -207,6 +203,8 @@ class _Problem:
     ) -> None:
         self._at, self._given, self._usual = at, given, usual_scatter
         self.floor, self.origin = 1.0, 0.0
+        #: Which of the two likelihoods is minimised, the restricted one first.
+        self.of = 0
         self._smooth = smooth
         norms = np.linalg.norm(at.common, axis=0)
         common = at.common / np.where(norms > 0.0, norms, 1.0)
@@ -258,11 +256,12 @@ class _Problem:
         return rest + whole, rest + random
 
     def with_slope(self, x: Array) -> tuple[float, Array]:
-        """The restricted one from its value at the start, with its derivatives, by differences."""
-        value = self.cost(x)[0]
+        """What is minimised from its value at the start, with its derivatives, by differences."""
+        value = self.cost(x)[self.of]
         step = DIFFERENCE * np.maximum(1.0, np.abs(x))
         moved = x + np.diag(step)
-        return value - self.origin, np.array([self.cost(at)[0] - value for at in moved]) / step
+        slope = np.array([self.cost(at)[self.of] - value for at in moved]) / step
+        return value - self.origin, slope
 
     def white(self, x: Array) -> Array:
         """Residual that is left with the specimens' deviations, but without smooth lines, white."""
