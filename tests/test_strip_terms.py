@@ -57,7 +57,8 @@ def hung(length, *, stiffer=one, rest=nothing, heavier=one, tilt=0.0, law=None):
             along, (length, 0.0), start, t_eval=at, rtol=1e-9, atol=1e-11, max_step=length / 60
         )
 
-    ends = np.linspace(-1.5, 1.0, 26)
+    # A long one all but hangs straight down.
+    ends = np.append(-np.pi / 2 + np.geomspace(1e-7, 0.07, 15), np.linspace(-1.5, 1.0, 26)[1:])
     miss = [back(end).y[0, -1] - tilt for end in ends]
     k = next(k for k in range(len(ends) - 1) if miss[k] * miss[k + 1] <= 0.0)
     end = brentq(lambda e: back(e).y[0, -1] - tilt, ends[k], ends[k + 1], xtol=1e-12)
@@ -73,7 +74,7 @@ def camera_sees(x, z, camera):
 def strips(
     lengths, *, sigma=0.0, rng=None, arc=True, count=24, until=1.0, upside_down=False, **made
 ):
-    """Strips of some lengths, the last held out where there are more than two."""
+    """One strip at some lengths, the last held out where there are more than two."""
     rng = rng or np.random.default_rng(0)
     camera = made.pop("camera", None)
     runs = []
@@ -87,7 +88,8 @@ def strips(
             "x_mm": x + (0.0 if arc else sigma * rng.normal(size=count)),
             "z_mm": z + sigma * rng.normal(size=count),
         }
-        runs.append(Run(f"{k}.csv", 1 < k == len(lengths) - 1, "", columns))
+        held = 1 < k == len(lengths) - 1
+        runs.append(Run(f"{k}.csv", held, "", columns, specimen="one"))
     fabric = FabricKeys(areal_density_kg_m2=DENSITY)
     rig = CantileverRig(width_mm=50.0, upside_down=upside_down)
     return Measurement(Path("strips"), "cantilever", "", fabric, rig, sigma or None, tuple(runs))
