@@ -11,7 +11,8 @@ from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Variant
 from ..inference.fitting import Fit
 from .discovered import Discovered
-from .drawing import AFTER, FAINT, FITTED, HELD_OUT, MANY, blank, legend, quantity_label
+from .drawing import AFTER, FAINT, blank, legend, quantity_label
+from .residuals import residual_points
 
 __all__ = ["discovered_figure"]
 
@@ -72,24 +73,7 @@ def _nearest_rival(d: Diagnosis, term: Discovered) -> tuple[str, Variant, Fit] |
 
 
 def _residual(d: Diagnosis, axes: Axes, model: Fit, along: Array, title: str) -> None:
-    readings = d.experiment.readings
-    shown = readings.usable & ~d.outliers
-    band = 2.0 * d.noise
-    axes.axhspan(-band, band, color=FAINT, linewidth=0, label="± 2 noise")
-    for flags, colour, kind in (
-        (shown & ~readings.holdout, FITTED, "fitted"),
-        (shown & readings.holdout, HELD_OUT, "held out"),
-    ):
-        if flags.any():
-            axes.scatter(
-                along[flags],
-                (model.residual * readings.weight)[flags],
-                s=5,
-                color=colour,
-                linewidth=0,
-                label=kind,
-                rasterized=len(along) > MANY,
-            )
+    residual_points(axes, d, model, along)
     axes.set_title(title, loc="left", fontsize=9)
     unit = quantity_label(d.experiment.quantity).partition("[")[2]
     axes.set_ylabel(f"residual [{unit}")

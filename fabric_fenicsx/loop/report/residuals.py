@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, StrMethodFormatter
 
 from ..inference.diagnosis import Diagnosis
+from ..inference.fitting import Fit
 from ..kinds import kind_of
 from .content import nearest_model
 from .drawing import (
@@ -28,7 +29,13 @@ from .drawing import (
     shown_model,
 )
 
-__all__ = ["autocorrelation", "dependence_figure", "noise_figure", "residual_figure"]
+__all__ = [
+    "autocorrelation",
+    "dependence_figure",
+    "noise_figure",
+    "residual_figure",
+    "residual_points",
+]
 
 Array = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.int64]
@@ -88,13 +95,36 @@ def residual_figure(diagnosis: Diagnosis, names: Sequence[str] | None = None) ->
     return figure
 
 
+def residual_points(axes: Axes, diagnosis: Diagnosis, model: Fit, along: Array) -> None:
+    """What a model leaves of all runs against something, with the band of the noise."""
+    readings = diagnosis.experiment.readings
+    shown = readings.usable & ~diagnosis.outliers
+    band = 2.0 * diagnosis.noise
+    if np.isfinite(band):
+        axes.axhspan(-band, band, color=FAINT, linewidth=0, label="± 2 noise")
+    axes.axhline(0.0, color=BEFORE, linewidth=0.8)
+    for flags, colour, kind in (
+        (shown & ~readings.holdout, FITTED, "fitted"),
+        (shown & readings.holdout, HELD_OUT, "held out"),
+    ):
+        if flags.any():
+            axes.scatter(
+                along[flags],
+                (model.residual * readings.weight)[flags],
+                s=5,
+                color=colour,
+                linewidth=0,
+                label=kind,
+                rasterized=len(along) > MANY,
+            )
+
+
 def dependence_figure(diagnosis: Diagnosis) -> Figure | None:
     """Residuals of all runs together against what else they may depend on; None: nothing."""
     readings = diagnosis.experiment.readings
     others = list(readings.covariates.items())[1:]
     if not others:
         return None
-    shown = readings.usable & ~diagnosis.outliers
     model = shown_model(diagnosis)
     models = [(diagnosis.baseline, "baseline")] + ([model] if model is not None else [])
     figure = blank(0.5 + 2.3 * len(models))
@@ -102,25 +132,7 @@ def dependence_figure(diagnosis: Diagnosis) -> Figure | None:
     for row, (fit, name) in enumerate(models):
         for column, (label, along) in enumerate(others):
             axes = panels[row, column]
-            band = 2.0 * diagnosis.noise
-            if np.isfinite(band):
-                axes.axhspan(-band, band, color=FAINT, linewidth=0, label="± 2 noise")
-            axes.axhline(0.0, color=BEFORE, linewidth=0.8)
-            for flags, colour, kind in (
-                (shown & ~readings.holdout, FITTED, "fitted"),
-                (shown & readings.holdout, HELD_OUT, "held out"),
-            ):
-                if not flags.any():
-                    continue
-                axes.scatter(
-                    along[flags],
-                    (fit.residual * readings.weight)[flags],
-                    s=5,
-                    color=colour,
-                    linewidth=0,
-                    label=kind,
-                    rasterized=len(along) > MANY,
-                )
+            residual_points(axes, diagnosis, fit, along)
             axes.ticklabel_format(axis="x", useOffset=False)
             middle = float(np.mean(along))
             # What hardly changes has no range of its own.
