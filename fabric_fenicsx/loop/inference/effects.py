@@ -13,7 +13,7 @@ from typing import Any
 
 from ...inputs.parameters import Parameter
 
-__all__ = ["Effect", "Parameter", "Shape", "Values", "Variant", "of_run", "scaled"]
+__all__ = ["Effect", "Parameter", "Shape", "Values", "Variant", "of_run", "scaled", "valued"]
 
 Values = Mapping[str, Any]
 
@@ -120,3 +120,10 @@ def of_run(p: Parameter, run: int) -> Parameter:
     """A parameter as that of one run alone, counted from 0; it may have been another run's."""
     name = p.name if p.run is None else p.name.split("_", 1)[1]
     return replace(p, name=f"run{run + 1}_{name}", run=run)
+
+
+def valued(given: Any, values: Values) -> Any:
+    """A number, or the value of what is fitted; of a tuple, each."""
+    if isinstance(given, tuple):
+        return tuple(valued(one, values) for one in given)
+    return values[given.name] if isinstance(given, Parameter) else given

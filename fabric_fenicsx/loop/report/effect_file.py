@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from ... import __version__
-from ...inputs.parameters import Parameter
+from ..inference.effects import valued
 from .discovered import Discovered
 
 __all__ = ["effect_file"]
@@ -128,7 +125,7 @@ def effect_file(term: Discovered, titles: str) -> str:
         ranges = shape.fixed["ranges"]
         form = {"term": term.effect.name, "form": term.variant.label}
         return (HEAD + OF_A_STRIP).format(values=values, ranges=ranges, **form, **words)
-    numbers = {name: _valued(n, term.values) for name, n in shape.fixed.items()}
+    numbers = {name: valued(n, term.values) for name, n in shape.fixed.items()}
     if "base" in numbers:
         if numbers["base"] == "elastic":
             numbers |= {"k1": term.values["k1_N"], "k3": term.values["k3_N"]}
@@ -137,10 +134,3 @@ def effect_file(term: Discovered, titles: str) -> str:
     numbers["kind"], variable = numbers.pop("shape"), numbers.pop("variable")
     lines = "\n".join(f"    {name!r}: {value!r}," for name, value in numbers.items())
     return (HEAD + OF_THE_RIG).format(numbers=lines, variable=variable, **words)
-
-
-def _valued(given: Any, values: Mapping[str, float]) -> Any:
-    """A number, or the value of what was fitted."""
-    if isinstance(given, tuple):
-        return tuple(_valued(one, values) for one in given)
-    return values[given.name] if isinstance(given, Parameter) else given

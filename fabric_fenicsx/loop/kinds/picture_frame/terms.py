@@ -15,7 +15,7 @@ from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import GRADED, ShapedLaw, shape_of
-from ...inference.effects import Effect, Shape, Values
+from ...inference.effects import Effect, Shape, Values, valued
 from .variant import FrameVariant
 
 __all__ = ["terms"]
@@ -152,24 +152,17 @@ def _laws(
 
 def _factor(numbers: Mapping[str, Any], values: Values, x: Any) -> Any:
     """A law's factor at a share x of the reach."""
-    own = {key: _valued(n, values) for key, n in numbers.items()}
+    own = {key: valued(n, values) for key, n in numbers.items()}
     shape = own.pop("shape"), own.pop("coefficients")
     at = {key: own[key] for key in ("place", "width") if key in own}
     return own.get("constant", 0.0) + shape_of(*shape, x, **at)
 
 
 def _law(numbers: Mapping[str, Any], values: Values) -> tuple[ShapedLaw, ...]:
-    own = {key: _valued(n, values) for key, n in numbers.items()}
+    own = {key: valued(n, values) for key, n in numbers.items()}
     if own["base"] == "elastic":
         own |= {"k1": values["k1_N"], "k3": values["k3_N"]}
     return (ShapedLaw(**own),)
-
-
-def _valued(given: Any, values: Values) -> Any:
-    """A number, or the value of what is fitted."""
-    if isinstance(given, tuple):
-        return tuple(_valued(one, values) for one in given)
-    return values[given.name] if isinstance(given, Parameter) else given
 
 
 def _wealth(variable: str) -> int:
