@@ -8,6 +8,7 @@ from ufl import as_ufl
 
 from fabric_fenicsx.inputs.python_file import classes_of, run_file
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
+from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.terms import terms
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw
 from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw, shape_of
@@ -261,6 +262,20 @@ def test_the_file_is_the_term(worn, tmp_path):
             memory[k].update(new)
         assert values[0] == pytest.approx(area * values[1], rel=1e-9, abs=1e-12)
         before = gamma
+
+
+def test_two_terms_of_the_travel_add(tmp_path):
+    """Each is seen beside the other: the force changes with either as it does with it alone."""
+    experiment = PictureFrame([read_measurement(write(tmp_path / "set", 0.0))])
+    by = {term.name: term for term in experiment.terms}
+    both = [by[f"travel_of_{name}"].variants[0] for name in ("time", "displacement")]
+    base = {"k1_N": K1, "k3_N": K3, "c1_N_s": C1}
+    names = [v.parameters[0].name for v in both]
+    together = experiment.predict(both, base | dict.fromkeys(names, 1e-9))[1]
+    for variant, name in zip(both, names, strict=True):
+        alone = experiment.predict((variant,), base | {name: 1e-9})[1][name]
+        assert np.abs(alone).max() > 0.01
+        np.testing.assert_allclose(together[name], alone, atol=1e-5 * np.abs(alone).max())
 
 
 def test_where_nothing_wears_nothing_is_discovered(tmp_path):

@@ -277,7 +277,8 @@ class PictureFrame:
             if v.added_travel is not None:
                 # The force with the travel as it would be without: what is added is little.
                 ahead = self._added(v, "travel", whole, values)
-                whole = self._force(self._moved(travel, ahead), mine, values)
+                travel = self._moved(travel, ahead)
+                whole = self._force(travel, mine, values)
         force, slopes = whole.value, dict(whole.slopes)
         zeros: list[tuple[Flags, Array]] = []
         for v in mine:
