@@ -170,9 +170,17 @@ def test_two_rates_do_not_tell_a_power_from_friction():
     assert found.verdict == "unexplained" and found.holdout_best > 2.0 * found.noise
 
 
-def test_two_rates_on_two_specimens_do_not_tell_a_dashpot_from_specimens():
+def test_two_rates_on_two_specimens_tell_as_much_as_their_springs_are_alike():
+    """Springs that agree say that dashpots would: what is left is a matter of the rate.
+
+    Which of the two names it is, two rates do not tell.
+    """
     _, found = diagnosed(10, "rate_hardening-thinning_alone")
-    assert found.verdict == "no_effect" and found.final.variances.scatter["c1_N_s"] > 0.1
+    ((own, others),) = found.rivals.items()
+    assert found.verdict == "effect_found"
+    assert {own, *others} == {"rate_hardening", "crossover_friction"}
+    assert found.final.variances.scatter["c1_N_s"] < 0.05
+    assert found.baseline.variances.scatter["c1_N_s"] > 0.2
 
 
 def test_a_form_is_not_chosen_by_what_it_foretells():

@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 from fabric_fenicsx.loop.inference.criteria import CRITERIA
 from fabric_fenicsx.loop.inference.fitting import fit, linearised
 from fabric_fenicsx.loop.inference.noise import Noise
-from fabric_fenicsx.loop.inference.variances import Linearised, Variances, estimate
+from fabric_fenicsx.loop.inference.variances import Linearised, Variances, averaged, estimate
 
 #: Of −2 log likelihood that the search leaves: nothing, to what is known of components.
 NEARLY = 0.1
@@ -196,3 +196,42 @@ def test_estimates_with_found_components_are_as_far_off_as_they_say():
     assert np.all(np.abs(np.mean(z, axis=0)) < 0.28 + 3.0 * 1.18 / np.sqrt(60))
     assert np.all(np.std(z, axis=0) < 1.4) and np.all(np.std(z, axis=0) > 0.9)
     assert np.all(np.mean(np.abs(z) < 1.96, axis=0) > 0.85)
+
+
+def test_a_floor_of_noise_is_not_lost_where_the_search_begins_without_one():
+    # In the run's first readings the force is next to nothing: with noise that is a share of the
+    # force alone they are exact, and a model that leaves anything there cannot be.
+    rng = np.random.default_rng(5)
+    t = np.tile(np.linspace(0.0, 1.0, 150) ** 2, 2)
+    data = readings(3.0 * t, run=np.repeat([0, 1], 150))
+    data = readings(3.0 * t + 0.02 * rng.normal(size=len(t)), run=np.repeat([0, 1], 150))
+    at = Linearised(data.observed - 3.0 * t, t[:, None], {}, data, np.ones(len(t), dtype=bool))
+    begun = [Variances(Noise(0.02)), Variances(Noise(3e-4, 0.016)), Variances(Noise(1e-5, 0.05))]
+    found = [estimate(at, start, given=0.017, smooth=True) for start in begun]
+    for other in found:
+        assert other.restricted == pytest.approx(found[0].restricted, abs=NEARLY)
+        assert other.variances.noise.floor == pytest.approx(0.02, rel=0.1)
+
+
+def test_a_scatter_that_is_not_known_is_expected_as_the_others_are():
+    """Two specimens' slopes, which the common parameters leave open: their levels say something.
+
+    By themselves they are as the prior has it: E τ² = E u², the square of what is usual.
+    """
+
+    def expected(apart, *groups):
+        at = example(3, 2, 40, 0.0, Noise(0.01))
+        t = at.common[:, 1]
+        run = at.readings.run[at.rows]
+        which = np.column_stack([run == 0, run == 1]).astype(float)
+        residual = at.residual - 2.0 - 3.0 * t + apart * 2.0 * (run - 0.5)
+        # The difference of the slopes is a parameter of the model's own.
+        common = np.column_stack([np.ones(len(t)), t, t * (run - 0.5)])
+        known = {"level": 2.0 * which, "slope": 3.0 * t[:, None] * which}
+        at = Linearised(residual, common, {g: known[g] for g in groups}, at.readings, at.rows)
+        return averaged(at, estimate(at, Variances(Noise(0.01)))).scatter["slope"]
+
+    usual = CRITERIA.usual_scatter
+    assert expected(0.0, "slope") == pytest.approx(usual, rel=0.05)
+    alike, near, apart = (expected(a, "level", "slope") for a in (0.0, 0.02, 0.2))
+    assert alike < near < usual < apart < 2.5 * usual

@@ -145,13 +145,20 @@ class Fit:
         """Standard errors, for what is left where that is more than the noise."""
         return {name: std * self._misfit for name, std in self.std.items()}
 
-    def errors_given(self, names: Sequence[str], known: Sequence[str]) -> dict[str, float]:
-        """Standard errors of some parameters if others were known to be as found."""
+    def wald(self, names: Sequence[str], known: Sequence[str]) -> float:
+        """Wald's statistic of some parameters: square of their distance from nothing, in errors.
+
+        As if others were known to be as found. It is that of all together: of two that the readings
+        hardly tell apart each may have any error.
+        """
         place = {name: k for k, name in enumerate(self.values)}
         own, given = (self.root[[place[n] for n in some]] for some in (names, known))
         # What the known ones leave of the independent combinations.
         left = own - own @ np.linalg.pinv(given) @ given if len(known) else own
-        return dict(zip(names, np.linalg.norm(left, axis=1) * self._misfit, strict=True))
+        found = np.array([self.values[n] for n in names])
+        # Smallest combination of the independent ones that takes them there: zero where none does.
+        least = np.linalg.lstsq(left, found, rcond=1e-10)[0]
+        return float(least @ least) / self._misfit**2
 
     @property
     def _misfit(self) -> float:

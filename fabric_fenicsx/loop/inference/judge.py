@@ -16,10 +16,10 @@ from math import comb, log
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from .criteria import CRITERIA
-from .effects import Effect
+from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitting import Fit, linearised
 from .noise import Whiteness, missed_readings, outliers, whiteness
@@ -253,19 +253,17 @@ class Judge:
         return bool(mine * own[0] < slack * other * own[1])
 
     def significant(self, model: Model) -> bool:
-        """Whether every effect has an amplitude that is more than its standard error.
+        """Whether every effect's amplitudes, together, are more than their standard errors.
 
         For its shape as it was found: without the effect there would be none.
         """
-        return all(
-            any(
-                abs(model.fit.values[name]) > CRITERIA.significant * error
-                for name, error in model.fit.errors_given(
-                    [p.name for p in variant.amplitudes], [p.name for p in variant.shapes]
-                ).items()
-            )
-            for variant in model.fit.variants
-        )
+
+        def significant(variant: Variant) -> bool:
+            names = [p.name for p in variant.amplitudes]
+            size = model.fit.wald(names, [p.name for p in variant.shapes])
+            return bool(chi2.sf(size, len(names)) < 2.0 * norm.sf(CRITERIA.significant))
+
+        return all(significant(variant) for variant in model.fit.variants)
 
     def holdout(self, model: Fit) -> float:
         """Held-out error: of the holdout runs, or of each part predicted from the others."""

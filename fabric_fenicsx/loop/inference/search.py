@@ -41,6 +41,8 @@ OWN_ZERO = (
 )
 #: Scatter of specimens, as a share, that first fits allow for.
 FIRST_SCATTER = 0.1
+#: ... and where they are taken to be all but alike.
+ALIKE = 0.01
 #: Forms whose own variances are looked for, beside the best ones of each set of effects.
 MOST_NEAR, OF_A_SET = 6, 2
 #: Models whose parameters are fitted again with their own variances ...
@@ -223,9 +225,9 @@ class _Search:
         """Candidates by themselves, and models by their number of effects, the best first."""
         self.progress(0.0, "signatures")
         base = self._baseline(self._start)
-        alike, _ = self.experiment.predict((), base.values)
+        expected, _ = self.experiment.predict((), base.values)
         signs = {
-            effect: {v: signatures(self.experiment, base, alike, v) for v in effect.variants}
+            effect: {v: signatures(self.experiment, base, expected, v) for v in effect.variants}
             for effect in self.effects
         }
         self._base, self._signatures, self._forms = base, signs, {}
@@ -238,12 +240,15 @@ class _Search:
             for effect, result in zip(self.effects, screen.scores(self.effects), strict=True)
         ]
         found: list[Sketch] = []
+        alike: list[Sketch] = []
         tried = screen.most_promising(CRITERIA.terms) if self._screened_first else self.effects
         for k, effect in enumerate(tried):
             self.progress(0.1 + 0.4 * k / len(tried), f"fit {effect.name}")
             own = [((v, s),) for v, shapes in signs[effect].items() for s in shapes]
             found += [(f, (effect,)) for f in self._fitted(own, starts=2)]
-        singles = self._weighed(found)
+            alike += [(f, (effect,)) for f in self._with_alike_specimens(own)]
+        # Sizes of fits that allow for specimens and of those that do not are not compared.
+        singles = self._weighed(found) + self._weighed(alike)
         levels.append(self._best_refined(singles))
         for candidate in candidates:
             mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
@@ -348,6 +353,21 @@ class _Search:
             effects = frozenset(self._effects_of(model))
             self._forms.setdefault(effects, []).append(model)
         return found
+
+    def _with_alike_specimens(self, combinations: Sequence[Combination]) -> list[Fit]:
+        """Forms of an effect with specimens that hardly differ.
+
+        What the baseline takes for their differences may be all that there is of an effect; a fit
+        that allows for them as they were does not get there.
+        """
+        if not self.variances.scatter or not self._base.deviations:
+            return []
+        allowed = self.variances
+        self.variances = Variances(allowed.noise, dict.fromkeys(allowed.scatter, ALIKE))
+        try:
+            return self._fitted(combinations, starts=1)
+        finally:
+            self.variances = allowed
 
     def _effects_of(self, model: Fit) -> tuple[Effect, ...]:
         return tuple(self._effect_of(v) for v in model.variants)

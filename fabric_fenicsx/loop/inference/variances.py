@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import trapezoid
 from scipy.interpolate import BSpline
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
@@ -41,12 +40,14 @@ SCATTER_UNIT, SHARE_UNIT = 0.01, 4e-4
 HARDLY = 1e-3
 #: Gain of −2 log likelihood in a step below which it is the last one.
 ENOUGH = 1e-4
+#: ... in all, beyond which that step, which is a share of it, was not yet a small one.
+FAR = 100.0
 #: Step of a difference quotient.
 DIFFERENCE = 1e-5
 #: Products of columns that are kept, for different correlations and shares.
 KEPT = 20
 #: Values of a scatter that are tried.
-TRIED = 15
+TRIED = 21
 #: Largest correlation of neighbours; of a single run slower noise is not told from a misfit.
 MOST_CORRELATED, OF_ONE_RUN = 0.9, 0.5
 
@@ -126,32 +127,47 @@ def estimate(
     problem = _Problem(at, given, smooth, usual_scatter)
     groups = list(at.specimens)
     scatter = [start.scatter.get(group, 0.1) for group in groups]
-    begin = [0.0, start.noise.correlation, start.noise.share**2 / SHARE_UNIT]
+    # A floor that is far off, beside a large share, is not where others are measured from.
+    problem.floor = start.noise.typical(at.readings, at.rows)
+    begin = [float(np.log(start.noise.floor / problem.floor)), start.noise.correlation]
+    begin.append(start.noise.share**2 / SHARE_UNIT)
     begin += [s**2 / SCATTER_UNIT for s in scatter] + [1.0] * smooth
-    problem.floor = start.noise.floor
     correlated = problem.most_correlated
     # Were all bounds finite, the first step would be the whole gradient: into a corner of them.
     bounds: list[tuple[float, float]] = [(-4.0, 4.0), (0.0, correlated), (0.0, np.inf)]
     bounds += [(0.0, np.inf)] * (len(groups) + smooth)
     x0 = np.clip(begin, [low for low, _ in bounds], [high for _, high in bounds])
-    problem.origin = problem.cost(x0)[0]
     options = {"maxiter": 60, "ftol": ENOUGH}
-    found = minimize(
-        problem.with_slope, x0, method="L-BFGS-B", jac=True, bounds=bounds, options=options
-    )
-    restricted, likelihood = problem.cost(found.x)
+
+    def likeliest(x: Array) -> Array:
+        gain = np.inf
+        while gain > FAR:
+            problem.origin = problem.cost(x)[problem.of]
+            found = minimize(
+                problem.with_slope, x, method="L-BFGS-B", jac=True, bounds=bounds, options=options
+            )
+            x, gain = np.asarray(found.x), -found.fun
+        return x
+
+    found = likeliest(x0)
+    noise = problem.split(found)[0]
+    typical = noise.typical(at.readings, at.rows)
+    if noise.floor < typical / np.sqrt(2.0):
+        # A floor of next to nothing can be likeliest among its neighbours alone.
+        even = found.copy()
+        even[0], even[2] = np.log(typical / problem.floor), 0.0
+        found = min((found, likeliest(even)), key=lambda x: problem.cost(x)[0])
+    restricted, likelihood = problem.cost(found)
     if compared and groups:
         # With the components that are likeliest by the likelihood itself, from others.
-        problem.of, problem.origin = 1, likelihood
-        alike = found.x.copy()
+        problem.of = 1
+        alike = found.copy()
         alike[3 : 3 + len(groups)] = HARDLY
-        other = minimize(
-            problem.with_slope, alike, method="L-BFGS-B", jac=True, bounds=bounds, options=options
-        )
-        likelihood = min(likelihood, problem.cost(other.x)[1])
-    noise, taus, omega = problem.split(found.x)
+        other = likeliest(alike)
+        likelihood = min(likelihood, problem.cost(other)[1])
+    noise, taus, omega = problem.split(found)
     variances = Variances(noise, dict(zip(groups, taus.tolist(), strict=True)))
-    return Estimate(variances, omega, restricted, likelihood, problem.white(found.x))
+    return Estimate(variances, omega, restricted, likelihood, problem.white(found))
 
 
 def averaged(
@@ -164,25 +180,35 @@ def averaged(
     """The components with each τ² as its mean over what it may be, not its likeliest value.
 
     Of few specimens τ is hardly known, and its likeliest value is too small for standard errors.
-    One τ at a time, the others as found, flat in τ but for its prior.
+    What the other groups' specimens differ by says something of it: τ_g ~ half-normal(u) with one
+    u, itself half-normal(`usual_scatter`), for all groups (Gelman, Bayesian Anal. 1, 2006, of such
+    priors). The likelihood of each τ is taken with the others as found.
     """
-    problem = _Problem(at, given, False, usual_scatter)
+    problem = _Problem(at, given, False, np.inf)
     noise = found.variances.noise
     problem.floor = noise.floor
     groups = list(at.specimens)
     taus = np.array([found.variances.scatter[group] for group in groups])
     fixed = [0.0, noise.correlation, noise.share**2 / SHARE_UNIT]
+    tried = np.linspace(0.0, 1.0, TRIED) ** 2 * (3.0 * usual_scatter + 4.0 * max(taus, default=0.0))
+    cells = np.gradient(tried)
+    cells[[0, -1]] *= 0.5
+    costs = np.empty((len(groups), TRIED))
+    for k, t in np.ndindex(costs.shape):
+        own = taus.copy()
+        own[k] = tried[t]
+        costs[k, t] = problem.cost(np.array([*fixed, *(own**2 / SCATTER_UNIT)]))[0]
+    likely = np.exp(-0.5 * (costs - costs.min(axis=1, keepdims=True)))
+    # Rows: u; columns: τ.
+    usual = tried[1:]
+    density = np.exp(-0.5 * (tried / usual[:, None]) ** 2) * cells
+    density /= density.sum(axis=1, keepdims=True)
+    of_usual = np.exp(-0.5 * (usual / usual_scatter) ** 2) * cells[1:]
     scatter = {}
     for k, group in enumerate(groups):
-        tried = np.linspace(0.0, 1.0, TRIED) ** 2 * (3.0 * usual_scatter + 4.0 * taus[k])
-        costs = []
-        for tau in tried:
-            own = taus.copy()
-            own[k] = tau
-            costs.append(problem.cost(np.array([*fixed, *(own**2 / SCATTER_UNIT)]))[0])
-        likely = np.exp(-0.5 * (np.array(costs) - min(costs)))
-        mean = trapezoid(likely * tried**2, tried) / trapezoid(likely, tried)
-        scatter[group] = float(np.sqrt(mean))
+        others = np.delete(likely, k, axis=0) @ density.T
+        weights = likely[k] * ((of_usual * others.prod(axis=0)) @ density)
+        scatter[group] = float(np.sqrt(weights @ tried**2 / weights.sum()))
     return Variances(noise, scatter)
 
 
