@@ -125,7 +125,7 @@ class Drape:
         Raises:
             InputError: there is no drape of such a rig, law or C1.
         """
-        self._shear, self._C1, self._source = shear or ShearLaw(), C1, source
+        self._shear, self._C1 = shear or ShearLaw(), C1
         self._shear_source = source if shear is not None else "assumed, as in demos/drape.yaml"
         self._C1_source = source if C1 is not None else "of the measurement's tows"
         for m in self.measurements:
@@ -145,6 +145,10 @@ class Drape:
         """
         strips = any(test.test == "cantilever" for test in fabric.tests)
         self._fabric = fabric if strips else fabric.model_copy(update={"tow": None})
+        if self._fabric.crossover is not None:
+            self._shear_source = OF_OTHERS
+        if self._fabric.tow is not None:
+            self._C1_source = OF_OTHERS
         for m in self.measurements:
             self._case(m, {})
 
@@ -272,19 +276,16 @@ class Drape:
         cases = [self._case(m, {}) for m in self.measurements]
         law = cases[0].crossover
         C1 = ", ".join(f"{value:.6g}" for value in sorted({case.tow.C1_MPa for case in cases}))
-        found = self._fabric
-        shear = (
-            OF_OTHERS if found is not None and found.crossover is not None else self._shear_source
-        )
-        tow = OF_OTHERS if found is not None and found.tow is not None else self._C1_source
-        laws = [one.model_dump()["law"] for one in (*law.laws, *cases[0].tow.bending)]
+
+        def beside(laws: Sequence[Any]) -> str:
+            return "".join(f" and {one.model_dump()['law']}" for one in laws)
+
         scatter = float(np.sqrt(np.mean(self.model_scatter**2)))
         error = float(np.sqrt(np.mean(np.sum(self.model_error**2, axis=1))))
         return [
             f"Shear law m = {law.k1_N_mm:.4g} γ + {law.k3_N_mm:.4g} γ³ + "
-            f"{law.dashpot_N_s_mm:.4g} dγ/dt N/mm ({shear}).",
-            f"C1 = {C1} MPa ({tow}).",
-            *([f"Beside these: {', '.join(laws)} ({OF_OTHERS})."] if laws else []),
+            f"{law.dashpot_N_s_mm:.4g} dγ/dt N/mm{beside(law.laws)} ({self._shear_source}).",
+            f"C1 = {C1} MPa{beside(cases[0].tow.bending)} ({self._C1_source}).",
             f"The model's own error is {error:.2g} degrees rms at these places, alike at places "
             "near each other: from other cells, another spacing of the tows, harder contact and a "
             f"kinematic net. Waves of two spacings, {scatter:.2g} degrees rms, are filtered out "
