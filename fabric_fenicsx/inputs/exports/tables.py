@@ -10,7 +10,7 @@ from pathlib import Path
 from ...errors import InputError
 from .numbers import is_clock, is_number
 from .text import SEPARATORS, cells_of, heading_cells
-from .units import known
+from .units import known, split_unit
 
 __all__ = ["ExportedTable", "find_tables", "side_by_side"]
 
@@ -198,9 +198,10 @@ def side_by_side(table: ExportedTable) -> list[ExportedTable]:
     They do where the same headings come again in the same order, but for numbers at their ends; the
     first column may be common to all.
     """
+    parts = map(split_unit, table.headings)
     names = [
-        re.sub(r"[\s_#.]*\(?\d+\)?$", "", heading).casefold() + "|" + unit
-        for heading, unit in zip(table.headings, table.units, strict=True)
+        (re.sub(r"[\s_#.]*\(?\d+\)?$", "", name).casefold(), unit, below)
+        for (name, unit), below in zip(parts, table.units, strict=True)
     ]
     for common in (0, 1):
         count = len(names) - common

@@ -207,7 +207,7 @@ def _yaml(target: Target, content: Mapping[str, Any], missing: Sequence[str]) ->
 
 def account(runs: Mapping[str, ImportedRun], width: int | None = None) -> str:
     """What was taken for what, as a table, and which rows were left out."""
-    table = Table("file", "from", "column", "taken from", "unit", "factor", "and")
+    table = Table("file", "from", "column", "taken from", "unit", "factor")
     notes = []
     for file, run in runs.items():
         source = f"{run.path.name}, {run.label}" if run.label else run.path.name
@@ -219,12 +219,12 @@ def account(runs: Mapping[str, ImportedRun], width: int | None = None) -> str:
                 escape(taken.heading) or "-",
                 escape(taken.unit) or "-",
                 "-" if taken.factor is None else f"{taken.factor:.12g}",
-                escape("; ".join(taken.remarks)),
                 end_section=k == len(run.taken) - 1,
             )
         last = f"line {run.lines[0]} to {run.lines[-1]}"
         notes.append(f"{file}: {len(run.lines)} readings, {last} of {run.path}")
-        notes += [f"{file}: {note}" for note in run.notes]
+        said = [f"{t.column}: {'; '.join(t.remarks)}" for t in run.taken if t.remarks]
+        notes += [f"{file}: {words}" for words in (*said, *run.notes)]
     console = Console(file=io.StringIO(), width=width, highlight=False)
     console.print(table)
     for note in notes:
