@@ -99,6 +99,18 @@ STYLES = {
         + lines(";", TIME * 1e3, FORCE / 10, TRAVEL / 10, form="{:.7f}"),
         "utf-16-le",
     ),
+    "single blanks": (
+        "Time [s] Crosshead travel [mm] Load cell [N]\n" + lines(" ", TIME, TRAVEL, FORCE),
+        "utf-8",
+    ),
+    "results above, headings on each page": (
+        "Nr;Fmax;dL\n;N;mm\n1;12,5;33,1\n2;12,5;33,1\n3;12,5;33,1\n4;12,5;33,1\n5;12,5;33,1\n"
+        "6;12,5;33,1\n7;12,5;33,1\n\nt;s;F\ns;mm;N\n"
+        + lines(";", TIME[:3], TRAVEL[:3], FORCE[:3], decimal=",")
+        + "\nt;s;F\ns;mm;N\n"
+        + lines(";", TIME[3:], TRAVEL[3:], FORCE[3:], decimal=","),
+        "utf-8",
+    ),
     "blanks": (
         "# a comment\nTime [s]   Crosshead [um]   Load [mN]\n"
         + lines("     ", TIME, TRAVEL * 1e3, FORCE * 1e3),
@@ -203,7 +215,13 @@ def test_specimens_with_one_time(tmp_path):
 
 @pytest.mark.parametrize(
     "between",
-    ["Specimen 2\n", "Specimen 2\nt [s];F [N];s [mm]\n", "\nend\n", "Probe 2\n\nt;F;s\ns;kN;mm\n"],
+    [
+        "Specimen 2\n",
+        "t [s];F [N];s [mm]\n",
+        "Specimen 2\nt [s];F [N];s [mm]\n",
+        "\nend\n",
+        "Probe 2\n\nt;F;s\ns;kN;mm\n",
+    ],
 )
 def test_specimens_below_each_other(between, tmp_path):
     force = FORCE / 1e3 if "kN" in between else FORCE
@@ -420,6 +438,9 @@ BAD = {
         ["force_N: unit 'furlong' in 'Load [furlong]'", "lbf", "--unit force_N=UNIT"],
     ),
     "no unit": ("t [s];Load;s [mm]\n" + ROWS, [], ["force_N: no unit in 'Load'", "--unit"]),
+    "no headings": (ROWS, [], ["time_s among no headings", "--column time_s=1, a number"]),
+    "fabric": (HEAD + ROWS, ["--set", "fabric=3"], ["--set: fabric, allowed are its keys"]),
+    "no run": (HEAD + ROWS, ["--set", "runs.3.role=fit"], ["--set: runs.3.role, allowed is"]),
     "no time": (
         "F [N];s [mm]\n" + lines(";", FORCE, TRAVEL),
         [],

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from shutil import get_terminal_size
 from typing import Annotated
 
 import typer
@@ -212,7 +213,7 @@ def import_data(
     content, missing = content_of(target, keys, settings or [])
     write_import(out, target, runs, content, missing)
     if not quiet:
-        print(account(runs), end="")
+        print(account(runs, get_terminal_size((120, 24)).columns), end="")
         if missing:
             print(f"to be filled in: {', '.join(missing)}")
         print(out)

@@ -16,6 +16,9 @@ Array = npt.NDArray[np.float64]
 MARKS = {".": ",", ",": "."}
 """Marks of decimals, each with the mark that then may group thousands."""
 
+ENOUGH = 20000
+"""Cells after which one that shows the mark is believed."""
+
 NUMBER = re.compile(
     r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+|\d{1,3}(?:,\d{3})+(?:\.\d*)?|\d{1,3}(?:\.\d{3})+(?:,\d*)?"
     r"|\d{1,3}(?:[' ]\d{3})+(?:[.,]\d*)?)(?:[eE][+-]?\d+)?"
@@ -43,7 +46,9 @@ def decimal_marks(cells: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]
     """
     shown: dict[str, str] = {}
     open_: dict[str, str] = {}
-    for cell in cells:
+    for number, cell in enumerate(cells):
+        if shown and number > ENOUGH:
+            break
         text = cell.translate(TIDY)
         marks = [sign for sign in text if sign in MARKS]
         if not marks or NUMBER.fullmatch(text) is None:
@@ -65,6 +70,12 @@ def numbers(cells: Sequence[str], decimal: str) -> Array:
         cells: the texts.
         decimal: mark of the decimals; the other one, a blank or an apostrophe group thousands.
     """
+    plain = [cell or "nan" for cell in cells]
+    if set().union(*plain) <= set("0123456789+-eEna" + decimal):
+        try:
+            return np.array([float(cell.replace(decimal, ".")) for cell in plain])
+        except ValueError:
+            pass
     text = pd.Series(cells, dtype=object).astype(str).str.translate(TIDY).str.strip()
     point, group = re.escape(decimal), re.escape(MARKS[decimal])
     end = rf"(?:{point}\d*)?(?:[eE][+-]?\d+)?"

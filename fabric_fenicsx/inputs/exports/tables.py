@@ -38,7 +38,7 @@ class ExportedTable:
         lines: number of each row's line, from 1.
         header: number of the headings' line; 0 where there is none.
         others: numbers of lines between the rows that are no readings.
-        breaks: rows that have such a line before them.
+        breaks: rows that have such a line before them, and whether it has the headings again.
         separator: between the cells.
     """
 
@@ -52,7 +52,7 @@ class ExportedTable:
     rows: list[list[str]] = field(default_factory=list)
     lines: list[int] = field(default_factory=list)
     others: list[int] = field(default_factory=list)
-    breaks: list[int] = field(default_factory=list)
+    breaks: dict[int, bool] = field(default_factory=dict)
 
 
 Numbered = tuple[int, str]
@@ -130,26 +130,29 @@ def _squared(table: ExportedTable) -> None:
 def _tables(path: Path, lines: Sequence[Numbered], separator: str) -> Iterator[ExportedTable]:
     table: ExportedTable | None = None
     before: list[Numbered] = []
+    digits = set("0123456789+-.eE" + separator)
     for number, line in lines:
         cells = cells_of(line, separator)
         if not cells:
             continue
-        if not _readings(cells, table is not None and not before):
+        inside = table is not None and not before
+        if not ((inside and set(line) <= digits) or _readings(cells, inside)):
             before.append((number, line))
             continue
         if table is None or before:
             header = _header(path, before, separator, len(cells))
-            if table is None or len(header.headings) >= len(cells):
+            again = table is not None and not header.label and _alike(table, header)
+            if table is None or (len(header.headings) >= len(cells) and not again):
                 if table is not None:
                     yield table
                 table = header
             elif SPECIMEN.fullmatch(before[-1][1].strip()):
                 yield table
                 label = before[-1][1].strip()
-                table = replace(table, label=label, rows=[], lines=[], others=[], breaks=[])
+                table = replace(table, label=label, rows=[], lines=[], others=[], breaks={})
             else:
                 # Readings that go on, or those of the next specimen: the time tells which.
-                table.breaks.append(len(table.rows))
+                table.breaks[len(table.rows)] = again
                 table.others.extend(n for n, _ in before)
             before = []
         table.rows.append(cells)
@@ -180,6 +183,11 @@ def _header(path: Path, before: Sequence[Numbered], separator: str, width: int) 
     titled = sum(map(bool, above)) == 1 and SPECIMEN.fullmatch(next(filter(None, above)))
     label = next(filter(None, above)) if titled else ""
     return ExportedTable(path, headings, units, label, above, number, separator)
+
+
+def _alike(table: ExportedTable, header: ExportedTable) -> bool:
+    """Whether a table's headings stand there again."""
+    return (header.headings, header.units) == (table.headings, table.units) != ([], [])
 
 
 def _is_units(cells: list[str]) -> bool:
@@ -229,5 +237,5 @@ def _part(table: ExportedTable, common: int, own: range, number: int) -> Exporte
         above=[],
         rows=[[table.rows[i][k] for k in columns] for i in filled],
         lines=[table.lines[i] for i in filled],
-        breaks=[sum(i < at for i in filled) for at in table.breaks],
+        breaks={sum(i < at for i in filled): again for at, again in table.breaks.items()},
     )

@@ -106,6 +106,11 @@ def heading_cells(line: str, separator: str, width: int) -> list[str]:
     """
     if separator != " ":
         return cells_of(line, separator)
-    by_brackets = r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?"
-    ways = [line.split(), re.split(r"\s{2,}|\t", line.strip()), re.findall(by_brackets, line)]
+    name, unit = r"[^\s\[(]+", r"\s*[\[(][^\])]*[\])]"
+    ways = [
+        line.split(),
+        re.split(r"\s{2,}|\t", line.strip()),
+        re.findall(f"{name}(?:{unit})?", line),
+        re.findall(f"{name}(?:\\s+{name})*{unit}", line),
+    ]
     return next((cells for cells in ways if len(cells) == width), ways[0])

@@ -107,7 +107,7 @@ def _read(paths: Sequence[Path], wishes: Wishes, zone: Zone) -> _Frames:
     taken = Taken("shear_angle_deg", "", "", None)
     for path in sorted(paths, key=_number):
         table = max(tables_of(path, wishes), key=lambda table: len(table.rows))
-        decimal = decimal_of(table, wishes)
+        decimal = decimal_of([table], wishes)
         found = columns_of(table, [*POINTS, "frame", "time_s"], decimal, wishes)
         missing = [
             name

@@ -29,15 +29,16 @@ def tables_of(path: Path, wishes: Wishes) -> list[ExportedTable]:
     return find_tables(path, decoded(path, wishes.encoding), wishes.separator, wishes.skip)
 
 
-def decimal_of(table: ExportedTable, wishes: Wishes) -> str:
-    """The mark of the decimals of a table: as a user says, or as its numbers tell.
+def decimal_of(tables: Sequence[ExportedTable], wishes: Wishes) -> str:
+    """The mark of the decimals in the tables of a file: as a user says, or as its numbers tell.
 
     Raises:
         InputError: they tell both, or all of them can be read both ways.
     """
     if wishes.decimal is not None:
         return wishes.decimal
-    shown, either = decimal_marks(cell for row in table.rows for cell in row)
+    shown, either = decimal_marks(c for table in tables for row in table.rows for c in row)
+    table = tables[0]
     by_hand = "allowed is --decimal , or --decimal ."
     if len(shown) > 1:
         raise InputError(
@@ -50,11 +51,11 @@ def decimal_of(table: ExportedTable, wishes: Wishes) -> str:
     if not either or (table.separator == "," and set(either) == {"."}):
         return "."
     mark, cell = next(iter(either.items()))
-    line = next(n for n, row in zip(table.lines, table.rows, strict=True) if cell in row)
+    line = next(n for t in tables for n, row in zip(t.lines, t.rows, strict=True) if cell in row)
     readings = [cell.replace(mark, "."), cell.replace(mark, "")]
     raise InputError(
         f"{table.path}: line {line}: {cell!r} is {readings[0]} or {readings[1]}, and no other cell "
-        f"of the table tells which, {by_hand}"
+        f"tells which, {by_hand}"
     )
 
 

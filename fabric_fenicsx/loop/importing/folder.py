@@ -68,6 +68,9 @@ def content_of(
         for place in places:
             _put(content, place, value, key)
     missing = []
+    for group in ("fabric", "rig"):
+        if not isinstance(content[group], dict):
+            raise InputError(f"--set: {group}, allowed are its keys, as {group}.KEY=VALUE")
     for known in documented(target.keys):
         if known.default != "needed":
             continue
@@ -92,11 +95,11 @@ def _put(content: dict[str, Any], place: Sequence[str], value: Any, key: str) ->
     for part in place[:-1]:
         if isinstance(at, list):
             at = at[int(part)] if part.isdecimal() and int(part) < len(at) else None
-        else:
+        elif isinstance(at, dict):
             at = at.setdefault(part, {})
         if not isinstance(at, (dict, list)):
             raise InputError(f"--set: {key}, allowed is a key of {FILE}, or runs.0.KEY of a run")
-    if not isinstance(at, dict):
+    if not isinstance(at, dict) or list(place) == [SHARED]:
         raise InputError(f"--set: {key}, allowed is a key of {FILE}, or runs.0.KEY of a run")
     at[place[-1]] = value
 
@@ -131,7 +134,7 @@ def write_import(
         for file, run in runs.items():
             (staged / file).write_text(_csv(target, run), encoding="utf-8")
         (staged / FILE).write_text(_yaml(target, content, missing), encoding="utf-8")
-        (staged / ACCOUNT).write_text(account(runs, width=200), encoding="utf-8")
+        (staged / ACCOUNT).write_text(account(runs), encoding="utf-8")
         _check(staged, target, runs, missing)
         staged.chmod(0o777 & ~_umask())
         if folder.exists():
@@ -205,9 +208,11 @@ def _yaml(target: Target, content: Mapping[str, Any], missing: Sequence[str]) ->
     return "\n".join([*head, text])
 
 
-def account(runs: Mapping[str, ImportedRun], width: int | None = None) -> str:
+def account(runs: Mapping[str, ImportedRun], width: int = 200) -> str:
     """What was taken for what, as a table, and which rows were left out."""
-    table = Table("file", "from", "column", "taken from", "unit", "factor")
+    table = Table()
+    for heading in ("file", "from", "column", "taken from", "unit", "factor"):
+        table.add_column(heading, no_wrap=heading == "column", overflow="fold")
     notes = []
     for file, run in runs.items():
         source = f"{run.path.name}, {run.label}" if run.label else run.path.name

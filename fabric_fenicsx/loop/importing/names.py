@@ -14,7 +14,7 @@ from ...inputs.exports.units import factor, known, quantity_of, split_unit
 from ...inputs.keys import one_of
 from ...inputs.validation import suggestion
 
-__all__ = ["chosen", "downwards", "heading_parts"]
+__all__ = ["NoSuchColumn", "chosen", "downwards", "heading_parts"]
 
 Array = npt.NDArray[np.float64]
 
@@ -62,6 +62,10 @@ PLAIN = {"ä": "ae", "ö": "oe", "ü": "ue", "é": "e", "è": "e"}
 STRAINS = {"strain", "dehnung"}
 
 
+class NoSuchColumn(InputError):
+    """A heading that a user has given is not in a table; it may be in another one of the file."""
+
+
 def heading_parts(table: ExportedTable, column: int) -> tuple[str, str]:
     """Name and unit of a column, the unit from its own line or from the heading."""
     name, unit = split_unit(table.headings[column])
@@ -104,8 +108,8 @@ def chosen(
         ]
         if not likely:
             continue
-        first = readings(likely[0])
         for other in likely[1:]:
+            first = readings(likely[0])
             if not np.allclose(readings(other), first, rtol=1e-6, atol=0.0, equal_nan=True):
                 headings = one_of([repr(table.headings[k]) for k in likely])
                 raise InputError(
@@ -134,7 +138,7 @@ def _by_hand(table: ExportedTable, name: str, heading: str) -> int:
     many = "stands more than once" if whole or named else "no such column"
     close = "" if whole or named else suggestion(heading, table.headings)
     allowed = one_of([repr(text) for text in table.headings if text] or ["none"])
-    raise InputError(
+    raise NoSuchColumn(
         f"{table.path}: --column {name}={heading}: {many}{close}, "
         f"allowed are {allowed}, or a number from 1 to {width}"
     )

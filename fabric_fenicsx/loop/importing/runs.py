@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from ...inputs.exports.tables import ExportedTable, side_by_side
 from ...inputs.keys import one_of
 from ...inputs.tables import Column
 from .columns import INSTEAD, columns_of, converted, decimal_of, tables_of
+from .names import NoSuchColumn
 from .target import Target
 from .thinning import thinned
 from .wishes import ImportedRun, Taken, Wishes
@@ -27,35 +28,38 @@ STANDING = 0.1
 """Share of the readings that may have the time of the one before them."""
 
 
+class _Lacking(InputError):
+    """A table that has not all that a run needs; another one of the file may."""
+
+
 def read_runs(path: Path, target: Target, wishes: Wishes) -> list[ImportedRun]:
     """The runs in an export, one for each specimen that stands in it, beside or below others.
 
     Raises:
         InputError: one line that names the file, the column or line, and what is allowed.
     """
-    tables = [part for table in tables_of(path, wishes) for part in side_by_side(table)]
+    tables = tables_of(path, wishes)
+    decimal = decimal_of(tables, wishes)
+    names = [column.name for column in target.columns if column.name not in wishes.constants]
+    frames = ["frame"] if set(names) & set(INSTEAD) else []
     runs: list[ImportedRun] = []
-    missing: dict[int, str] = {}
-    for table in tables:
-        if len(table.rows) < target.fewest:
-            missing[len(table.rows)] = (
-                f"{len(table.rows)} readings, allowed are {target.fewest} or more of them"
-            )
-            continue
-        decimal = decimal_of(table, wishes)
-        names = [column.name for column in target.columns]
-        names = [name for name in names if name not in wishes.constants]
-        frames = ["frame"] if set(names) & set(INSTEAD) else []
-        found = columns_of(table, [*names, *frames], decimal, wishes)
-        lacking = _lacking(table, found, target, wishes)
-        if lacking:
-            missing[len(table.rows)] = lacking
+    missing: dict[int, InputError] = {}
+    for table in chain.from_iterable(map(side_by_side, tables)):
+        size = len(table.rows)
+        try:
+            if size < target.fewest:
+                raise _Lacking(f"{path}: {size} readings, allowed are {target.fewest} or more")
+            found = columns_of(table, [*names, *frames], decimal, wishes)
+            if lacking := _lacking(table, found, target, wishes):
+                raise _Lacking(f"{path}: {lacking}")
+        except (_Lacking, NoSuchColumn) as error:
+            missing[size] = error
             continue
         for part in _restarting(table, found, decimal, wishes):
             runs.append(_run(part, found, decimal, target, wishes))
     if not runs:
         # Small tables above the readings lack more.
-        raise InputError(f"{path}: {missing[max(missing)]}")
+        raise missing[max(missing)]
     return runs
 
 
@@ -80,7 +84,7 @@ def _lacking(
             or INSTEAD.get(name) in found
         ):
             continue
-        more = f'--column {name}="..."'
+        more = f'--column {name}="..."' if any(table.headings) else f"--column {name}=1, a number"
         if name == "time_s":
             if wishes.rate is not None:
                 continue
@@ -96,11 +100,16 @@ def _lacking(
 def _restarting(
     table: ExportedTable, found: dict[str, int], decimal: str, wishes: Wishes
 ) -> Iterator[ExportedTable]:
-    """The parts of a table whose time begins anew after a line that is no reading."""
+    """The parts of a table whose time begins anew after a line that is no reading.
+
+    Without a time, the headings that stand there again begin a part.
+    """
     starts = [0]
     if "time_s" in found:
         time, _ = converted(table, "time_s", found["time_s"], decimal, wishes)
-        starts += [at for at in table.breaks if at < len(time) and time[at] <= time[at - 1]]
+        starts += [at for at in table.breaks if 0 < at < len(time) and time[at] <= time[at - 1]]
+    else:
+        starts += [at for at, again in table.breaks.items() if again and 0 < at < len(table.rows)]
     for number, (a, b) in enumerate(pairwise([*starts, len(table.rows)]), start=1):
         label = table.label if len(starts) == 1 else f"specimen {number}"
         yield replace(table, label=label, rows=table.rows[a:b], lines=table.lines[a:b])
@@ -195,6 +204,8 @@ def _remark(run: ImportedRun, name: str, words: str) -> None:
 def _cut(run: ImportedRun, wishes: Wishes) -> None:
     """Leave out what is before the start and after the break, where that is asked for."""
     force = run.columns["force_N"]
+    if (wishes.preload, wishes.break_share) != (None, None) and not np.isfinite(force).any():
+        raise InputError(f"{run.path}: --preload and --break need a force_N")
     if wishes.preload is not None:
         reached = force >= wishes.preload
         if not reached.any():
