@@ -239,8 +239,8 @@ def test_rows_that_are_no_readings_are_told(tmp_path):
     out = imported(tmp_path, text)
     is_the_record(*runs(out))
     said = (out / "import.txt").read_text(encoding="utf-8")
-    assert "1 rows: not a number (line 4)" in said
-    assert "2 lines between or after the readings left out: 5, 10" in said
+    assert "1 row left out, not a number: line 4" in said
+    assert "lines between or after the readings that are none: 5, 10" in said
 
 
 def test_signs_zeros_start_and_break(tmp_path):
@@ -420,7 +420,15 @@ def test_the_account_says_what_was_taken(tmp_path, capsys):
     out = tmp_path / "out"
     assert command("import", path, "--as", "picture_frame", "--out", out) == 0
     said = capsys.readouterr().out
-    for words in ("Standardkraft", "kN", "1000", "60", "line 2 to 7", "to be filled in: fabric"):
+    for words in (
+        "Standardkraft",
+        "kN",
+        "1000",
+        "60",
+        "line 2 to 7",
+        "semicolon",
+        "to be filled in: fabric",
+    ):
         assert words in said
 
 
@@ -492,6 +500,8 @@ BAD = {
     "a workbook": (b"PK\x03\x04abc", [], ["is an Excel or OpenDocument workbook", "CSV"]),
     "a zone": (HEAD + ROWS, ["--frame", 3], ["--frame: not of picture_frame"]),
     "never reached": (HEAD + ROWS, ["--preload", 1e6], ["--preload 1e+06 N is never reached"]),
+    "signs": (HEAD + ROWS, ["--separator", ";;"], ["--separator: ;;, allowed is a sign"]),
+    "encoding": (HEAD + ROWS, ["--encoding", "morse"], ["--encoding: morse, allowed"]),
     "separator": (HEAD + ROWS, ["--separator", "tab"], ["no table with two columns of numbers"]),
     "decimal": (HEAD + ROWS, ["--decimal", ","], ["most rows are no numbers with ','"]),
 }  # fmt: skip

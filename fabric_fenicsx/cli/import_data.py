@@ -17,8 +17,6 @@ from .results import listed
 
 __all__ = ["import_data"]
 
-SEPARATORS = {"tab": "\t", "\\t": "\t", "blanks": " "}
-
 CAMERA = "dic."
 """Before the names of columns in a camera's tables."""
 
@@ -178,7 +176,7 @@ def import_data(
     camera = Wishes(
         columns={k.removeprefix(CAMERA): v for k, v in by_hand.items() if k.startswith(CAMERA)},
         units={k.removeprefix(CAMERA): v for k, v in said.items() if k.startswith(CAMERA)},
-        separator=SEPARATORS.get(separator, separator) if separator is not None else None,
+        separator=_separator(separator),
         decimal=decimal,
         encoding=encoding,
         turn=tuple(turn or []),
@@ -238,6 +236,17 @@ def _each(option: str, given: Pairs, count: int) -> list[str]:
     if len(given) not in (1, count):
         raise InputError(f"{option}: given {len(given)} times, allowed is once or {count} times")
     return given * count if len(given) == 1 else given
+
+
+def _separator(given: str | None) -> str | None:
+    """The sign of --separator, which may be given by its name."""
+    from ..inputs.exports.text import SEPARATORS
+
+    signs = {name: sign for sign, name in SEPARATORS.items()} | {"\\t": "\t"}
+    sign = signs.get(given or "", given)
+    if sign is not None and (len(sign) != 1 or sign.isalnum() or sign in "\"'.+-\r\n"):
+        raise InputError(f"--separator: {given}, allowed is a sign or one of {', '.join(signs)}")
+    return sign
 
 
 def _value(name: str, text: str) -> float:

@@ -53,10 +53,8 @@ def decoded(path: Path, encoding: str | None = None) -> str:
         text = data.decode(encoding or _encoding(data))
     except LookupError:
         raise InputError(f"--encoding: {encoding}, allowed is the name of one, as cp1252") from None
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path}: not {error.encoding} at byte {error.start}, allowed is --encoding NAME"
-        ) from None
+    except UnicodeError:
+        raise InputError(f"{path}: not {encoding or _encoding(data)}, --encoding NAME") from None
     if "\0" in text:
         raise InputError(f"{path}: is no text, allowed is {what}")
     return text.removeprefix("\ufeff")

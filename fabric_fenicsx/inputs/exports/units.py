@@ -67,16 +67,15 @@ UNITS: dict[str, dict[str, float]] = {
         "°": 1.0,
         "degree": 1.0,
         "degrees": 1.0,
-        "grad": 1.0,
         "rad": math.degrees(1.0),
         "mrad": math.degrees(1e-3),
         "gon": 0.9,
     },
     "strain": {"%": 1e-2, "mm/mm": 1.0, "m/m": 1.0, "in/in": 1.0, "um/m": 1e-6},
 }
-"""What one of a unit is in N, mm, s, degrees and 1.
+"""What one of a unit is in N, mm, s, degrees and 1; a mass above forces is its weight.
 
-A mass above forces is its weight; German ``Grad`` is a degree.
+``grad`` is none of them: it is a degree in German and 0.9 of one in English.
 """
 
 CLOCKS = {
@@ -95,18 +94,21 @@ JOINTS = (r"\s+in\s+", r"\s*/\s*", r"\s*,\s*", r"\s+", r"_")
 
 
 def quantity_of(column: str) -> str:
-    """What a column of ours is: force, length, time or angle, from the unit in its name."""
-    return QUANTITIES[column.rpartition("_")[2]]
+    """What a column of ours is: force, length, time or angle, or else the unit in its name."""
+    unit = column.rpartition("_")[2]
+    return QUANTITIES.get(unit, unit)
 
 
 def allowed_units(quantity: str) -> str:
     """The units of a quantity, in words."""
-    return one_of([*UNITS[quantity], *(["hh:mm:ss", "mm:ss"] if quantity == "time" else [])])
+    return one_of(
+        [*UNITS.get(quantity, [quantity]), *(["hh:mm:ss", "mm:ss"] if quantity == "time" else [])]
+    )
 
 
 def factor(unit: str, quantity: str) -> float | None:
     """What one of a unit is in N, mm, s, degrees or 1; None where it is not known."""
-    units, plain = UNITS[quantity], _plain(unit)
+    units, plain = UNITS.get(quantity, {quantity: 1.0}), _plain(unit)
     if plain in units:
         return units[plain]
     if quantity == "time" and plain.lower() in CLOCKS:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -125,31 +124,19 @@ def write_import(
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder}: exists, allowed is a new or an empty folder")
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        staged = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
-    try:
+    with tempfile.TemporaryDirectory() as name:
+        staged = Path(name) / "folder"
+        staged.mkdir()
         for file, run in runs.items():
             (staged / file).write_text(_csv(target, run), encoding="utf-8")
         (staged / FILE).write_text(_yaml(target, content, missing), encoding="utf-8")
         (staged / ACCOUNT).write_text(account(runs), encoding="utf-8")
         _check(staged, target, runs, missing)
-        staged.chmod(0o777 & ~_umask())
-        if folder.exists():
-            folder.rmdir()
-        os.replace(staged, folder)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
-    finally:
-        shutil.rmtree(staged, ignore_errors=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+        try:
+            shutil.copytree(staged, folder, dirs_exist_ok=True)
+        except OSError as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"{folder}: cannot be written ({reason})") from None
 
 
 def _check(
@@ -197,8 +184,6 @@ def _yaml(target: Target, content: Mapping[str, Any], missing: Sequence[str]) ->
             + f".{name}"
         ]
         marks.append(f" # FILL IN {key.allowed}: {key.description}")
-    if not whole["rig"]:
-        del whole["rig"]
     text = yaml.safe_dump(whole, sort_keys=False, allow_unicode=True)
     for k, mark in reversed(list(enumerate(marks))):
         text = text.replace(f" {OPEN}{k}\n", f"{mark}\n")

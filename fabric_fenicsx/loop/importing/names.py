@@ -176,8 +176,10 @@ def is_named(name: str, ours: str) -> bool:
     """Whether a name, without its unit, may be that of a column of ours."""
     words = _words(name)
     text = " ".join(words)
-    if text in NAMES[ours]:
+    # A kind of measurement that is not of this package has names of its own.
+    names = NAMES.get(ours, (" ".join(ours.split("_")[:-1]),))
+    if text in names:
         return True
     if ours in WHOLE or OTHERS & set(words) or (ours == "angle_deg" and "shear" in words):
         return False
-    return any(len(name) > 1 and f" {name} " in f" {text} " for name in NAMES[ours])
+    return any(len(name) > 1 and f" {name} " in f" {text} " for name in names)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from ...errors import InputError
 from ...inputs.exports.tables import ExportedTable, side_by_side
+from ...inputs.exports.text import SEPARATORS
 from ...inputs.keys import one_of
 from ...inputs.tables import Column
 from .columns import INSTEAD, columns_of, converted, decimal_of, tables_of
@@ -118,7 +119,9 @@ def _restarting(
 def _run(
     table: ExportedTable, found: dict[str, int], decimal: str, target: Target, wishes: Wishes
 ) -> ImportedRun:
-    run = ImportedRun(table.path, table.label, {}, np.array(table.lines), [], [])
+    between = SEPARATORS.get(table.separator, repr(table.separator))
+    notes = [f"{between} between cells, {decimal!r} before decimals"]
+    run = ImportedRun(table.path, table.label, {}, np.array(table.lines), [], notes)
     for column in target.columns:
         _fill(run, column, table, found, decimal, wishes)
     if "frame" in found:
@@ -140,9 +143,7 @@ def _run(
     run.keep(whole, "not a number")
     if table.others:
         shown = ", ".join(map(str, table.others[:4])) + (", ..." if len(table.others) > 4 else "")
-        run.notes.append(
-            f"{len(table.others)} lines between or after the readings left out: {shown}"
-        )
+        run.notes.append(f"lines between or after the readings that are none: {shown}")
     for name in wishes.turn:
         if name in run.columns:
             run.columns[name] = -run.columns[name]

@@ -100,7 +100,8 @@ class ImportedRun:
         if not len(lines):
             return
         shown = ", ".join(map(str, lines[:4])) + (", ..." if len(lines) > 4 else "")
-        self.notes.append(f"{len(lines)} rows: {why} (line {shown})")
+        rows = "row" if len(lines) == 1 else "rows"
+        self.notes.append(f"{len(lines)} {rows} left out, {why}: line {shown}")
         self.columns = {name: values[kept] for name, values in self.columns.items()}
         self.lines = self.lines[kept]
         if self.frames is not None:
