@@ -234,13 +234,21 @@ def test_specimens_below_each_other(between, tmp_path):
 
 def test_rows_that_are_no_readings_are_told(tmp_path):
     rows = lines(";", TIME, FORCE, TRAVEL).splitlines()
-    rows[2:2] = ["0.7;n/a;0.3", "pause by the operator"]
+    rows[2:2] = ["0.7;n/a;0.3", "pause by the operator", "---;---;---", "Hold;on;please"]
     text = "t [s];F [N];s [mm]\n" + "\n".join(rows) + "\nend of the test\n\n"
     out = imported(tmp_path, text)
     is_the_record(*runs(out))
     said = (out / "import.txt").read_text(encoding="utf-8")
     assert "1 row left out, not a number: line 4" in said
-    assert "lines between or after the readings that are none: 5, 10" in said
+    assert "lines between or after the readings that are none: 5, 6, 7, 12" in said
+
+
+def test_a_table_that_is_left_out_is_told(tmp_path):
+    """Results stand above the readings, with a number of a force and no time."""
+    text, _ = STYLES["results above, headings on each page"]
+    out = imported(tmp_path, text)
+    said = (out / "import.txt").read_text(encoding="utf-8")
+    assert "a table left out, line 3 to 9: line 1: no column for time_s" in said
 
 
 def test_signs_zeros_start_and_break(tmp_path):
@@ -465,7 +473,7 @@ BAD = {
         HEAD + ROWS + "0.9;1.0;1.0\n", [], ["line 8: time_s: 0.9 after 2.5", "increases"],
     ),
     "time stands": (
-        HEAD + lines(";", TIME.round(), FORCE, TRAVEL),
+        HEAD + lines(";", TIME // 2, FORCE, TRAVEL),
         [],
         ["time_s stands still in", "more digits"],
     ),

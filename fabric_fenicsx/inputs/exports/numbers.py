@@ -9,7 +9,15 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-__all__ = ["MARKS", "clock_seconds", "decimal_marks", "is_clock", "is_number", "numbers"]
+__all__ = [
+    "MARKS",
+    "clock_seconds",
+    "decimal_marks",
+    "is_clock",
+    "is_nothing",
+    "is_number",
+    "numbers",
+]
 
 Array = npt.NDArray[np.float64]
 
@@ -24,12 +32,18 @@ NUMBER = re.compile(
     r"|\d{1,3}(?:[' ]\d{3})+(?:[.,]\d*)?)(?:[eE][+-]?\d+)?"
 )
 CLOCK = re.compile(r"\d+:\d{1,2}(?::\d{1,2})?(?:[.,]\d+)?")
+NOTHING = re.compile(r"[-*.#?]+|#?n/?a[!?]?|nan|[+-]?inf|null|none", re.IGNORECASE)
 TIDY = str.maketrans({"\u00a0": " ", "\u202f": " ", "\u2009": " ", "\u2212": "-", "’": "'"})
 
 
 def is_number(cell: str) -> bool:
     """Whether a cell is a number, with either mark of decimals."""
     return NUMBER.fullmatch(cell.translate(TIDY)) is not None
+
+
+def is_nothing(cell: str) -> bool:
+    """Whether a cell says that there is no number: ``n/a``, ``---``."""
+    return NOTHING.fullmatch(cell) is not None
 
 
 def is_clock(cell: str) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...errors import InputError
-from .numbers import is_clock, is_number
+from .numbers import is_clock, is_nothing, is_number
 from .text import SEPARATORS, cells_of, heading_cells
 from .units import known, split_unit
 
@@ -142,7 +142,7 @@ def _tables(path: Path, lines: Sequence[Numbered], separator: str) -> Iterator[E
         if table is None or before:
             header = _header(path, before, separator, len(cells))
             again = table is not None and not header.label and _alike(table, header)
-            if table is None or (len(header.headings) >= len(cells) and not again):
+            if table is None or (_begins(header, len(cells)) and not again):
                 if table is not None:
                     yield table
                 table = header
@@ -165,7 +165,9 @@ def _tables(path: Path, lines: Sequence[Numbered], separator: str) -> Iterator[E
 def _readings(cells: list[str], inside: bool) -> bool:
     """Whether a line has readings: half of its cells, and two, are numbers; within a table one."""
     filled = [cell for cell in cells if cell]
-    count = sum(is_number(cell) or is_clock(cell) for cell in filled)
+    count = sum(
+        is_number(cell) or is_clock(cell) or (inside and is_nothing(cell)) for cell in filled
+    )
     return 2 * count >= len(filled) and count >= (1 if inside else 2)
 
 
@@ -185,6 +187,12 @@ def _header(path: Path, before: Sequence[Numbered], separator: str, width: int) 
     return ExportedTable(path, headings, units, label, above, number, separator)
 
 
+def _begins(header: ExportedTable, width: int) -> bool:
+    """Whether lines between readings are the headings of another table, and not a remark."""
+    with_units = header.units or any(known(split_unit(cell)[1]) for cell in header.headings)
+    return len(header.headings) >= width and bool(with_units or header.label)
+
+
 def _alike(table: ExportedTable, header: ExportedTable) -> bool:
     """Whether a table's headings stand there again."""
     return (header.headings, header.units) == (table.headings, table.units) != ([], [])
@@ -197,7 +205,9 @@ def _is_units(cells: list[str]) -> bool:
 
 def _is_headings(cells: list[str]) -> bool:
     filled = [cell for cell in cells if cell]
-    return len(filled) > 1 and not any(is_number(cell) or is_clock(cell) for cell in filled)
+    return len(filled) > 1 and not any(
+        is_number(cell) or is_clock(cell) or is_nothing(cell) for cell in filled
+    )
 
 
 def side_by_side(table: ExportedTable) -> list[ExportedTable]:

@@ -54,7 +54,8 @@ def decoded(path: Path, encoding: str | None = None) -> str:
     except LookupError:
         raise InputError(f"--encoding: {encoding}, allowed is the name of one, as cp1252") from None
     except UnicodeError:
-        raise InputError(f"{path}: not {encoding or _encoding(data)}, --encoding NAME") from None
+        kind = encoding or _encoding(data)
+        raise InputError(f"{path}: no text in {kind}, allowed is --encoding NAME") from None
     if "\0" in text:
         raise InputError(f"{path}: is no text, allowed is {what}")
     return text.removeprefix("\ufeff")

@@ -26,7 +26,7 @@ __all__ = ["read_runs"]
 Array = npt.NDArray[np.float64]
 
 STANDING = 0.1
-"""Share of the readings that may have the time of the one before them."""
+"""Share of the readings, or two of them, that may have the time of the one before them."""
 
 
 class _Lacking(InputError):
@@ -44,7 +44,7 @@ def read_runs(path: Path, target: Target, wishes: Wishes) -> list[ImportedRun]:
     names = [column.name for column in target.columns if column.name not in wishes.constants]
     frames = ["frame"] if set(names) & set(INSTEAD) else []
     runs: list[ImportedRun] = []
-    missing: dict[int, InputError] = {}
+    missing: list[tuple[ExportedTable, InputError]] = []
     for table in chain.from_iterable(map(side_by_side, tables)):
         size = len(table.rows)
         try:
@@ -54,13 +54,16 @@ def read_runs(path: Path, target: Target, wishes: Wishes) -> list[ImportedRun]:
             if lacking := _lacking(table, found, target, wishes):
                 raise _Lacking(f"{path}: {lacking}")
         except (_Lacking, NoSuchColumn) as error:
-            missing[size] = error
+            missing.append((table, error))
             continue
         for part in _restarting(table, found, decimal, wishes):
             runs.append(_run(part, found, decimal, target, wishes))
     if not runs:
         # Small tables above the readings lack more.
-        raise missing[max(missing)]
+        raise max(missing, key=lambda lacking: len(lacking[0].rows))[1]
+    for table, reason in missing:
+        why = str(reason).removeprefix(f"{path}: ").partition(", allowed")[0]
+        runs[0].notes.append(f"a table left out, line {table.lines[0]} to {table.lines[-1]}: {why}")
     return runs
 
 
@@ -253,7 +256,7 @@ def _in_time(run: ImportedRun, wishes: Wishes) -> None:
             "is a time that increases; with --column time_s= and --rate it is made from the travel"
         )
     stands = steps == 0.0
-    if stands.mean() > STANDING:
+    if stands.sum() > max(2.0, STANDING * len(time)):
         raise InputError(
             f"{run.path}: line {run.lines[int(np.argmax(stands))]}: time_s stands still in "
             f"{stands.sum()} of {len(time)} rows, allowed is a time that increases: more digits"
