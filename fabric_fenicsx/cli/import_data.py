@@ -162,10 +162,13 @@ def import_data(
         ("--preload", preload, target.moves),
         ("--break", break_share, target.moves),
         ("--dic", dic, "shear_angle_deg" in ours),
+        ("--gauge", gauge, target.moves),
         ("--frame", frame, test == "drape"),
+        ("--zone", zone, dic),
+        ("--dic-rate", dic_rate, dic),
     ):
         if wanted is not None and not only:
-            raise InputError(f"{name}: not of {test}")
+            raise InputError(f"{name}: not of {test}" + " without --dic" * (only is dic))
     for option, names in (("--zero", zero), ("--turn", turn)):
         for name in names or []:
             listed(option, name, ours)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...errors import InputError
+from ...inputs.exports.numbers import numbers
 from .columns import columns_of, converted, decimal_of, tables_of
 from .wishes import ImportedRun, Taken, Wishes
 
@@ -136,8 +137,7 @@ def _read(paths: Sequence[Path], wishes: Wishes, zone: Zone) -> _Frames:
         if several:
             number = np.full(len(x), _number(path))
         elif "frame" in found:
-            plain = replace(wishes, units={"time_s": "s"})
-            number = converted(table, "time_s", found["frame"], decimal, plain)[0]
+            number = numbers([row[found["frame"]] for row in table.rows], decimal)
         else:
             number = time
         rows.append(np.stack([number, time, x, y, angle]))

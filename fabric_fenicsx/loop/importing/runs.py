@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...errors import InputError
+from ...inputs.exports.numbers import numbers
 from ...inputs.exports.tables import ExportedTable, side_by_side
 from ...inputs.exports.text import SEPARATORS
 from ...inputs.keys import one_of
@@ -128,8 +129,9 @@ def _run(
     for column in target.columns:
         _fill(run, column, table, found, decimal, wishes)
     if "frame" in found:
-        frames = replace(wishes, units={"time_s": "s"})
-        run.frames = converted(table, "time_s", found["frame"], decimal, frames)[0]
+        run.frames = numbers([row[found["frame"]] for row in table.rows], decimal)
+    elif wishes.frame is not None:
+        raise InputError(f'{run.path}: --frame without frames, allowed is --column frame="..."')
     empty = {c.name for c in target.columns if c.may_be_empty}
     if "time_s" not in found and "time_s" not in wishes.constants and wishes.rate is not None:
         # It follows from the travel, once the readings are known.
