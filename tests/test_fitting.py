@@ -260,7 +260,7 @@ def test_walds_statistic_is_that_of_what_is_known():
     covariance = np.linalg.inv(J.T @ J / 0.05**2) * max(1.0, model.sum_of_squares / model.freedom)
     r = np.array([model.values["a"], model.values["b"]])
     both = float(r @ np.linalg.solve(covariance[:2, :2], r))
-    assert both > 1000.0 * r[0] ** 2 / covariance[0, 0]
+    assert both > 100.0 * r[0] ** 2 / covariance[0, 0]
     assert model.wald(["a", "b"], []) == pytest.approx(both, rel=1e-6)
     assert model.wald(["a", "b", "far"], []) == pytest.approx(both, rel=1e-6)
     assert model.wald(["a"], []) == pytest.approx(r[0] ** 2 / covariance[0, 0], rel=1e-6)
