@@ -1,10 +1,12 @@
 """The sixty sets diagnosed, as a table: what was put in, what was said, and the errors.
 
-    python tests/measurements/table.py SEED [SEED ...] [--only TEXT] [--leave-out] [--page FILE]
+    python tests/measurements/table.py SEED [SEED ...] [--only TEXT] [--specimen] [--leave-out]
+                                       [--page FILE]
 
 An answer is right where the verdict is, and where the names are, each itself or as one of the
 rivals that were named with it. With --leave-out every set of one effect is diagnosed without the
-forms of the library that have the shape put in; with --page the page has both.
+forms of the library that have the shape put in; with --specimen all runs of a set say that they are
+of one specimen, as they are; with --page the page has all three.
 """
 
 from __future__ import annotations
@@ -48,6 +50,12 @@ The sets of one effect again, each without the forms of the library that have th
 (`tests/measurements/counterparts.py`): a fabric has none of our formulas. An answer is right where
 the effect is still named, itself or as a rival.
 """
+ONE_SPECIMEN = """## Runs that say of which specimen they are
+
+In the sets above a run is a specimen of its own: where each rate or length was measured in one run,
+specimens that differ may be all that there is of an effect, and the answer to a set may be that. Here
+all runs of a set are said to be of one specimen, as they are.
+"""
 HEAD = "| seed | set | put in | said | rivals | before | after | expected | |\n|" + "---|" * 9
 
 
@@ -86,13 +94,16 @@ class Row:
         return self.truth.verdict == "no_effect" and self.verdict != "no_effect"
 
 
-def rows(seeds: list[int], only: str = "", *, leave_out: bool = False) -> Iterator[Row]:
+def rows(
+    seeds: list[int], only: str = "", *, leave_out: bool = False, specimen: bool = False
+) -> Iterator[Row]:
     """Write, diagnose and judge the sets of some seeds.
 
     Args:
         seeds: of the sets.
         only: text in the names of those taken.
         leave_out: take those of one effect, without the forms of the library that made them.
+        specimen: have all runs of a set say that they are of one specimen.
     """
     for seed in seeds:
         for recipe in sixty(seed):
@@ -101,6 +112,9 @@ def rows(seeds: list[int], only: str = "", *, leave_out: bool = False) -> Iterat
             with tempfile.TemporaryDirectory() as folder:
                 truth = recipe(Path(folder) / "set")
                 measurement = read_measurement(Path(folder) / "set")
+                if specimen:
+                    runs = tuple(replace(run, specimen="A") for run in measurement.runs)
+                    measurement = replace(measurement, runs=runs)
                 experiment = kind_of(measurement.test).experiment([measurement], ())
                 if leave_out:
                     experiment.effects = _without(experiment.effects, *_counterparts(recipe))
@@ -183,11 +197,11 @@ def summary(table: list[Row]) -> str:
     )
 
 
-def printed(seeds: list[int], only: str, *, leave_out: bool) -> list[str]:
+def printed(seeds: list[int], only: str, **how: bool) -> list[str]:
     """Print the table as it comes; its summary, head and lines."""
     print(HEAD)
     table = []
-    for row in rows(seeds, only, leave_out=leave_out):
+    for row in rows(seeds, only, **how):
         table.append(row)
         print(line(row), flush=True)
     print(f"\n{summary(table)}\n")
@@ -199,13 +213,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("seeds", type=int, nargs="+")
     parser.add_argument("--only", default="")
+    parser.add_argument("--specimen", action="store_true")
     parser.add_argument("--leave-out", action="store_true")
     parser.add_argument("--page", type=Path)
     given = parser.parse_args()
     lines = []
-    if given.page is not None or not given.leave_out:
-        lines += [OPENING, *printed(given.seeds, given.only, leave_out=False)]
-    if given.page is not None or given.leave_out:
+    everything = given.page is not None
+    if everything or not (given.leave_out or given.specimen):
+        lines += [OPENING, *printed(given.seeds, given.only)]
+    if everything or given.specimen:
+        lines += ["", ONE_SPECIMEN, *printed(given.seeds, given.only, specimen=True)]
+    if everything or given.leave_out:
         lines += ["", LEFT_OUT, *printed(given.seeds, given.only, leave_out=True)]
     if given.page is not None:
         given.page.write_text("\n".join(lines) + "\n")
