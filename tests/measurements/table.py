@@ -52,9 +52,9 @@ the effect is still named, itself or as a rival.
 """
 ONE_SPECIMEN = """## Runs that say of which specimen they are
 
-In the sets above a run is a specimen of its own: where each rate or length was measured in one run,
-specimens that differ may be all that there is of an effect, and the answer to a set may be that. Here
-all runs of a set are said to be of one specimen, as they are.
+In the sets above a run is a specimen of its own: where each rate or length was measured in one
+run, specimens that differ may be all that there is of an effect, and the answer to a set may be
+that. Here all runs of a set are said to be of one specimen, as they are.
 """
 HEAD = "| seed | set | put in | said | rivals | before | after | expected | |\n|" + "---|" * 9
 
