@@ -54,6 +54,7 @@ def pulled(folder, comm=MPI.COMM_SELF, **keys):
     case = BiasExtensionCase.model_validate({**SMALL, **keys})
     result = bias_extension.run(case, session(folder, comm))
     assert result["completed"]
+    comm.barrier()
     return pd.read_csv(folder / "curve.csv").iloc[-1], result
 
 
