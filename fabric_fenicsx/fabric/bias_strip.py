@@ -29,9 +29,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .layout import TowLayout, spaced_layout
+from .layout import TowFamily, TowLayout
 from .outline import Polygon, rectangle
-from .paths import ROUNDING
+from .paths import ROUNDING, check_size
 
 __all__ = ["BiasStrip"]
 
@@ -96,20 +96,28 @@ class BiasStrip:
         return spacing, spacing
 
     def layout(self, spacings: tuple[float, float], subdivisions: int = 1) -> TowLayout:
-        """The tows; they end where an edge or a clamp cuts them.
+        """The tows, alike on both sides of the middle; they end where an edge or a clamp cuts them.
+
+        Corners lie half-way between tows, and so do the borders of the zones. (With tows on the
+        borders, held all along, the error is of the other sign and twice as large.)
 
         Args:
             spacings: of warp and of weft tows [mm].
             subdivisions: cells between two neighbouring crossings.
+
+        Raises:
+            ValueError: the spacing is too large, or far too small.
         """
-        return spaced_layout(
-            self.outline,
-            warp_angle=90.0 + self.bias,
-            weft_angle=self.bias,
-            warp_spacing=spacings[0],
-            weft_spacing=spacings[1],
-            subdivisions=subdivisions,
-        )
+        angles = (90.0 + self.bias, self.bias)
+        # Weft tows lie beside each other along the warp, and the other way round.
+        extents = [float(np.ptp(self.outline.extent(axis))) for axis in self.tows]
+        check_size((extents[0], spacings[0]), (extents[1], spacings[1]), subdivisions)
+        families = []
+        for angle, extent, spacing in zip(angles, extents, spacings, strict=True):
+            count = max(round(extent / spacing), 1)
+            positions = spacing * (np.arange(count) - (count - 1) / 2.0)
+            families.append(TowFamily(angle, tuple(positions)))
+        return TowLayout(families[0], families[1], self.outline, subdivisions)
 
     def gripped(self, points: Floats) -> npt.NDArray[np.int64]:
         """How many of the two tows of a place end in a clamp: 0 in zone A, 1 in B, 2 in C, (n,).

@@ -100,7 +100,8 @@ def draw_curve(path: Path, columns: Mapping[str, Array], strip: BiasStrip) -> No
     travel = columns["displacement_mm"]
     force.plot(travel, columns["force_N"])
     force.set_ylabel("force [N]")
-    angle.plot(travel, columns["shear_angle_deg"], label="middle zone")
+    angle.plot(travel, columns["shear_angle_deg"], label="zone A")
+    angle.plot(travel, columns["centre_angle_deg"], label="its centre")
     classical = np.degrees(strip.angle(travel))
     angle.plot(travel, classical, "--", color="#7f8c8d", label="constant shear in each zone")
     angle.set_ylabel("shear angle [°]")

@@ -20,7 +20,7 @@ from ..fabric.layout import SHORTEST_END
 from ..fabric.net import Net
 from ..fabric.paths import TowPaths
 from ..inputs.groups import NotNegative, Positive
-from .cases import CrossoverKeys, StiffnessKeys, TowKeys
+from .cases import StiffnessKeys, TowKeys
 from .crosshead import CrossheadCase, crosshead, duration, turns
 from .rig import Compared, Rig
 
@@ -39,29 +39,25 @@ COLUMNS = (
     "displacement_mm",
     "force_N",
     "shear_angle_deg",
+    "centre_angle_deg",
     "waist_mm",
     "largest_slip_mm",
     "mean_slip_mm",
     "edge_slip_mm",
 )
-"""Of curve.csv. The angle is the mean over zone A of the angles between the tows' axes; slip is how
-far the two tows of a crossing have parted, its springs' stretch included: the largest, the mean and
-the mean on the free edges, without the crossings in the clamps."""
+"""Of curve.csv. Angles are those between the tows' axes, from places of neighbouring crossings: the
+mean over zone A, all crossings whose two tows end in no clamp, and over the same zone at half its
+length and width. Slip is how far the two tows of a crossing have parted, its springs' stretch
+included: the largest, the mean, and the mean on the free edges, without crossings in the clamps."""
 
 
 class StripTowKeys(TowKeys):
     """As elsewhere, but tows that bend easily in the sheet's plane, as bundles of fibres do."""
 
     stiffness: StiffnessKeys | None = Field(
-        StiffnessKeys(bending_in_plane_Nmm=1.0),
+        StiffnessKeys(bending_in_plane_Nmm=0.1),
         description="in place of what follows from the section",
     )
-
-
-class StripCrossoverKeys(CrossoverKeys):
-    """As elsewhere, but with springs soft enough for a few iterations and stiff enough to pin."""
-
-    translation_N_mm: Positive = Field(10.0, description="k of the three translational springs")
 
 
 class BiasExtensionCase(CrossheadCase):
@@ -80,7 +76,9 @@ class BiasExtensionCase(CrossheadCase):
     )
     weft_spacing_mm: Positive = Field(5.2, description="distance between weft tows, likewise")
     subdivisions: Annotated[int, Field(ge=1, le=64)] = Field(
-        1, description="cells of a tow between two crossings"
+        1,
+        description="cells of a tow between two crossings; with more than one, tows that bend "
+        "easily in the sheet's plane evade the crossings' springs by winding between them",
     )
     travel_mm: Positive = Field(30.0, description="of the crosshead")
     hold_s: NotNegative = Field(0.0, description="time at rest before the way back")
@@ -89,9 +87,6 @@ class BiasExtensionCase(CrossheadCase):
         0.0, description="along the strip, away from the crosshead; 9810 for one that hangs"
     )
     tow: StripTowKeys = Field(default_factory=StripTowKeys, description="the virtual tows")
-    crossover: StripCrossoverKeys = Field(
-        default_factory=StripCrossoverKeys, description="the crossings"
-    )
 
     @model_validator(mode="after")
     def _has_a_middle(self) -> BiasExtensionCase:
@@ -163,16 +158,21 @@ def build(case: BiasExtensionCase, session: Session) -> Model:
     )
 
 
-def middle_zone(net: Net, case: BiasExtensionCase) -> Integers:
-    """Crossings whose two tows end in no clamp, zone A, those on its border among them.
+def middle_zone(net: Net, case: BiasExtensionCase) -> tuple[Integers, Integers]:
+    """Crossings whose two tows end in no clamp, zone A, and those of A at half its size.
 
     Raises:
         InputError: a mesh of the user's own has none.
     """
-    middle = np.flatnonzero(case.strip.gripped(net.points[net.crossings[:, 0]]) == 0)
-    if not len(middle):
-        raise InputError("mesh: no crossing of two tows that end in no clamp, allowed is one")
-    return middle
+    places = net.points[net.crossings[:, 0]]
+    zone, centre = (
+        np.flatnonzero(case.strip.gripped(factor * places) == 0) for factor in (1.0, 2.0)
+    )
+    if not len(centre):
+        raise InputError(
+            "mesh: no crossing about the origin, allowed is one with tows that end in no clamp"
+        )
+    return zone, centre
 
 
 def waist(net: Net, case: BiasExtensionCase, displacement: Array) -> float:
@@ -199,7 +199,7 @@ def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
     model = build(case, session)
     net = model.net
     lower, upper = clamps(net, case)
-    middle = middle_zone(net, case)
+    middle, centre = middle_zone(net, case)
     warp, weft = net.crossings.T
     free = np.flatnonzero(~np.isin(warp, np.concatenate([lower, upper])))
     edge = np.abs(net.points[warp, 0]) > case.width_mm / 2.0 - max(case.spacings) / 2.0
@@ -208,10 +208,12 @@ def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
     def measure(snapshot: Snapshot) -> dict[str, float]:
         u = snapshot.displacement
         slip = np.linalg.norm(u[weft] - u[warp], axis=1)
+        angle = np.degrees(snapshot.shear_angle)
         return {
             "displacement_mm": crosshead(case, snapshot.time),
             "force_N": float(model.reactions()[upper, 1].sum()),
-            "shear_angle_deg": float(np.degrees(snapshot.shear_angle[middle].mean())),
+            "shear_angle_deg": float(angle[middle].mean()),
+            "centre_angle_deg": float(angle[centre].mean()),
             "waist_mm": waist(net, case, u),
             "largest_slip_mm": float(slip[free].max()),
             "mean_slip_mm": float(slip[free].mean()),
