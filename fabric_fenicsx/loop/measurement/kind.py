@@ -14,7 +14,7 @@ from ...inputs.groups import Keys
 from ...inputs.tables import Column
 from ..inference.experiment import Experiment
 from .proposal import Proposal
-from .schema import Measurement
+from .schema import Measurement, RunKeys
 
 __all__ = ["Kind", "MadeUp", "Mistake", "called_later"]
 
@@ -58,6 +58,7 @@ class Kind:
     Attributes:
         name: as ``test`` in a measurement.yaml.
         rig: keys of its rig.
+        run: keys of an entry of ``runs``.
         quantity: what is compared, a column; also the key of its noise.
         label: that, with its unit, as on an axis.
         columns: of each CSV file.
@@ -86,6 +87,7 @@ class Kind:
     mistakes: Callable[[Any, Mapping[str, Array]], Iterator[Mistake]] = lambda rig, columns: iter(
         ()
     )
+    run: type[RunKeys] = RunKeys
     made_up: Callable[..., MadeUp] | None = None
     options: tuple[str, ...] = ()
     proposals: Callable[[Sequence[Measurement]], list[Proposal]] = lambda measurements: []
