@@ -43,7 +43,7 @@ GROUPS = 24
 #: Points of the way on which a law with memory is followed to its curve.
 ALONG = 60
 #: Share of the work by which a curve may differ from the one that a strip was solved with ...
-NEAR = 0.1
+NEAR = 0.2
 #: ... and how often a strip is solved anew, at most, for each kind of motion.
 MOST = 12
 #: Curve that strips are first solved with, moment per area over its largest, of γ [rad].
