@@ -265,6 +265,38 @@ def test_two_ranks_equal_one(tmp_path):
         assert other.to_numpy() == pytest.approx(one.to_numpy(), rel=1e-6, abs=1e-6)
 
 
+def test_a_mesh_of_another_strip_is_refused():
+    case = BiasExtensionCase.model_validate(SMALL)
+    shorter = mesh_net(BiasStrip(90.0, 40.0).layout(case.spacings))
+    with pytest.raises(InputError, match=r"^mesh: no node in a clamp, allowed is .* -50 and 50$"):
+        bias_extension.clamps(shorter, case)
+    sides = shorter.points[shorter.crossings[:, 0], 0] > 0.4 * 40.0
+    beside = replace(shorter, crossings=shorter.crossings[sides])
+    with pytest.raises(InputError, match=r"^mesh: no crossing about the origin"):
+        bias_extension.middle_zone(beside, case)
+
+
+def test_bending_in_the_plane_by_default():
+    """That of loose fibres, also where another stiffness is given; null asks for the section's."""
+    for stiffness, bending in (({}, 0.1), ({"stretch_N_mm": 500}, 0.1), (None, None)):
+        case = BiasExtensionCase.model_validate(SMALL | {"tow": {"stiffness": stiffness}})
+        assert case.tow.stiffness.bending_in_plane_Nmm == bending
+
+
+def test_goes_on_where_it_stopped(tmp_path):
+    """Cut at half its travel and resumed, a run with slip ends as the whole one."""
+    keys = {"crossover": {**SMALL["crossover"], "translation_N_mm": 10, "slip_limit_N": 0.05}}
+    whole, _ = pulled(tmp_path, **keys)
+    files = sorted((tmp_path / "steps").glob("*.npz"))
+    for file in files[len(files) // 2 :]:
+        file.unlink()
+    case = BiasExtensionCase.model_validate({**SMALL, **keys})
+    again = bias_extension.run(case, replace(session(tmp_path), resume=True))
+    assert again["completed"]
+    end = pd.read_csv(tmp_path / "curve.csv").iloc[-1]
+    assert end.to_numpy() == pytest.approx(whole.to_numpy(), rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("keys", "said"),
     [

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..errors import InputError
 from ..fabric.bias_strip import BiasStrip
@@ -51,13 +51,24 @@ length and width. Slip is how far the two tows of a crossing have parted, its sp
 included: the largest, the mean, and the mean on the free edges, without crossings in the clamps."""
 
 
-class StripTowKeys(TowKeys):
-    """As elsewhere, but tows that bend easily in the sheet's plane, as bundles of fibres do."""
+class StripStiffnessKeys(StiffnessKeys):
+    """As elsewhere, but tows bend easily in the sheet's plane, as bundles of loose fibres do."""
 
-    stiffness: StiffnessKeys | None = Field(
-        StiffnessKeys(bending_in_plane_Nmm=0.1),
-        description="in place of what follows from the section",
+    bending_in_plane_Nmm: Positive | None = Field(0.1, description="E I in the sheet's plane")
+
+
+class StripTowKeys(TowKeys):
+    """As elsewhere, but for the stiffness."""
+
+    stiffness: StripStiffnessKeys = Field(
+        default_factory=StripStiffnessKeys,
+        description="in place of what follows from the section; null: all as it follows",
     )
+
+    @field_validator("stiffness", mode="before")
+    @classmethod
+    def _all_of_the_section(cls, stiffness: Any) -> Any:
+        return {"bending_in_plane_Nmm": None} if stiffness is None else stiffness
 
 
 class BiasExtensionCase(CrossheadCase):
