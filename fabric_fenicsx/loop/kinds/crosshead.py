@@ -100,8 +100,9 @@ class CrossheadTest:
             "typical_rate": _typical(np.abs(rate)),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
+        shares |= self._more_shares()
         self._gamma, self._rate = gamma, rate
-        self.effects = [self._with_runs(scaled(e, shares)) for e in (*self.listed, *own)]
+        self.effects = [self._with_runs(self._scaled(e, shares)) for e in (*self.listed, *own)]
 
     # What a rig adds ----------------------------------------------------------------------
 
@@ -112,6 +113,14 @@ class CrossheadTest:
     def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
         """Keep what the kinematics need of the rig, before they are asked for."""
         raise NotImplementedError
+
+    def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
+        """An effect in the unit of the data."""
+        return scaled(effect, shares)
+
+    def _more_shares(self) -> dict[str, float]:
+        """Further ranges of the data that starts and bounds may be shares of."""
+        return {}
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         """γ at each point and at the one before, γ̇, 1/Δt, and what the moments are weighed by.

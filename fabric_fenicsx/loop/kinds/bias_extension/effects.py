@@ -30,7 +30,7 @@ class StripPullVariant(FrameVariant):
         changes: keys of the case (rigs.bias_extension.BiasExtensionCase) by their dotted names, of
             the value of the first parameter, an amplitude; not asked for at zero, the baseline.
         solved_at: values of that amplitude at which the strip is solved when it is needed, zero
-            apart; in between it is interpolated.
+            apart; in between it is interpolated. In the unit of its starts and bounds.
     """
 
     changes: Callable[[float], Mapping[str, Any]] | None = None
@@ -39,11 +39,20 @@ class StripPullVariant(FrameVariant):
 
 SLIP = Parameter(
     "slip_1_N",
-    (0.5, 2.0),
+    (1.0, 5.0),
     0.0,
-    20.0,
+    40.0,
     amplitude=True,
     meaning="one over the in-plane force at which tows slip at a crossing",
+    share_of="per_tow_force",
+)
+CRIMP = Parameter(
+    "crimp_strain",
+    (0.01, 0.03),
+    0.0,
+    0.06,
+    amplitude=True,
+    meaning="by which tows lengthen as their crimp is drawn out",
 )
 DRAWN = Parameter(
     "drawn_out",
@@ -77,8 +86,25 @@ BIAS_EXTENSION_EFFECTS = (
             StripPullVariant(
                 "at a force",
                 (SLIP,),
-                changes=lambda per_force: {"crossover.slip_limit_N": 1.0 / per_force},
-                solved_at=(0.5, 2.0, 6.0, 20.0),
+                changes=lambda per_force: {
+                    "crossover.slip_limit_N": 1.0 / per_force,
+                    # Of no weight beside the slip, in half the iterations.
+                    "crossover.translation_N_mm": 10.0,
+                },
+                solved_at=(2.5, 10.0, 40.0),
+            ),
+        ),
+    ),
+    Effect(
+        "tow_uncrimping",
+        "bias_extension",
+        "crimped tows stretch softly until the crimp is out",
+        (
+            StripPullVariant(
+                "soft, then stiff",
+                (CRIMP,),
+                changes=lambda strain: {"tow.crimp_strain": strain},
+                solved_at=(0.01, 0.03, 0.06),
             ),
         ),
     ),

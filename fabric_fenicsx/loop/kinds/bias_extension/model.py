@@ -24,6 +24,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ....errors import SolveError
+from ....fabric.bias_strip import BiasStrip
 from ...expressions.marching import Varying
 from ...inference.effects import Effect, Variant
 from ...measurement.schema import Measurement, Run
@@ -45,9 +46,11 @@ ALONG = 60
 #: Share of the work by which a curve may differ from the one that a strip was solved with ...
 NEAR = 0.2
 #: ... and how often a strip is solved anew, at most, for each kind of motion.
-MOST = 12
-#: Curve that strips are first solved with, moment per area over its largest, of γ [rad].
-FIRST = (0.1, 1.0)
+MOST = 8
+#: k1 and k3 [N/mm] of the curve that strips are first solved with where readings tell nothing ...
+FIRST = (0.002, 0.02)
+#: ... fewer than this many of them.
+FEWEST = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,36 +113,62 @@ class BiasExtension(CrossheadTest):
         out = np.argmax(D, axis=0)
         columns = np.arange(len(runs))
         self._speed = self._furthest / np.maximum(time[out, columns] - time[0], 1e-9)
-        first = Curve.through(FIRST[0] * np.radians(KNOTS) + FIRST[1] * np.radians(KNOTS) ** 3)
         self._groups: list[npt.NDArray[np.int64]] | None = None
-        self._mixture: Mixture = [(self._solve({}, first), 1.0, {})]
         # Of the curve that laws with memory and dashpots follow, the same throughout.
-        rates = [
-            float(way.middle(furthest)) / furthest * speed
-            for way, furthest, speed in zip(
-                self._mixture[0][0].ways, self._furthest, self._speed, strict=True
-            )
+        angles = [
+            _strip(m, run).angle(0.5 * D) for (m, run), D in zip(runs, self._furthest, strict=True)
         ]
-        self._typical_rate = float(np.median(rates))
-        sized = self._sized(first)
-        self._solved.clear()
-        self._mixture = [(self._solve({}, sized), 1.0, {})]
+        rates = 2.0 * np.array(angles) / self._furthest * self._speed
+        self._typical_rate = float(np.nanmedian(rates))
+        self._mixture: Mixture = [(self._solve({}, self._first_curve()), 1.0, {})]
 
-    def _sized(self, curve: Curve) -> Curve:
-        """The same, so large that it makes the largest forces that were read."""
-        read, made = 0.0, 0.0
-        for (_, run), way in zip(self._runs, self._mixture[0][0].ways, strict=True):
-            force = run.columns["force_N"]
-            k = int(np.argmax(np.abs(force)))
-            D = run.columns["displacement_mm"][k]
-            read += abs(float(force[k]))
-            made += float(np.sum(self._work(way, np.array([D]), curve)))
-        size = read / made if read > 0.0 < made else 1.0
-        return Curve(tuple(size * m for m in curve.moments))
+    def _first_curve(self) -> Curve:
+        """As the energy of zones of constant shear has it; where that is not known, a cubic."""
+        gamma, found = np.radians(KNOTS), []
+        for m, run in self._runs:
+            D, force = run.columns["displacement_mm"], run.columns["force_N"]
+            strip = _strip(m, run)
+            if run.holdout or strip.bias != 45.0 or strip.length < 2.0 * strip.width:
+                continue
+            angle = strip.angle(D)
+            before = np.fmax.accumulate(np.concatenate([[1e-3], angle[:-1]]))
+            rising = (angle > before) & (np.arange(len(D)) <= np.argmax(D))
+            if rising.sum() >= FEWEST:
+                moment = strip.moment(angle[rising], force[rising])
+                last = np.polyfit(angle[rising][-FEWEST:], moment[-FEWEST:], 1)
+                beyond = np.maximum(gamma - angle[rising][-1], 0.0) * max(last[0], 0.0)
+                found.append(np.interp(gamma, angle[rising], moment) + beyond)
+        typical = np.median(found, axis=0) if found else np.zeros_like(gamma)
+        if max(typical) <= 0.0:
+            typical = FIRST[0] * gamma + FIRST[1] * gamma**3
+        return Curve.through(typical)
 
     def _work(self, way: _Way, D: Array, curve: Curve) -> Array:
         """Σ A dγ/dD m(γ) of the groups at some travels, (n, GROUPS)."""
         return np.asarray(way.area * way.gamma(D, 1) * curve(way.gamma(D)))
+
+    def _more_shares(self) -> dict[str, float]:
+        """One over the largest force that comes on a tow of the clamps [1/N]."""
+        per_tow = [
+            float(np.abs(run.columns["force_N"]).max())
+            * m.fabric.tow_spacing_mm
+            / run.own["width_mm"]
+            for m, run in self._runs
+        ]
+        return {"per_tow_force": 1.0 / max(*per_tow, 1e-9)}
+
+    def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
+        found = super()._scaled(effect, shares)
+
+        def solved(own: Variant, v: Variant) -> Variant:
+            """With the amplitudes that strips are solved at in the same unit."""
+            if not isinstance(v, StripPullVariant):
+                return v
+            full = shares.get(own.parameters[0].share_of, 1.0)
+            return replace(v, solved_at=tuple(full * a for a in v.solved_at))
+
+        pairs = zip(effect.variants, found.variants, strict=True)
+        return replace(found, variants=tuple(solved(own, v) for own, v in pairs))
 
     # Strips -------------------------------------------------------------------------------
 
@@ -367,6 +396,10 @@ class BiasExtension(CrossheadTest):
             found.append(f"That foretold the forces of the next strips to {off:.2g} % rms.")
         found += [f"{key or 'pinned'}: {why}; left out." for key, why in self._failed.items()]
         return found
+
+
+def _strip(measurement: Measurement, run: Run) -> BiasStrip:
+    return BiasStrip(run.own["length_mm"], run.own["width_mm"], measurement.rig.bias_deg)
 
 
 def _key(changes: Mapping[str, Any]) -> str:
