@@ -3,6 +3,7 @@
 import importlib.util
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fabric_fenicsx.rigs.load import load_case
@@ -56,15 +57,46 @@ def test_bias_extension_against_its_formulas(tmp_path):
     assert numbers["slip_mm"] > 0.2
 
 
-def test_the_loop_is_closed(tmp_path):
-    """The friction that was hidden is named, inside three standard errors of what was put in."""
-    loop = demo("close_the_loop")
+def test_hidden_friction_is_named(tmp_path):
+    """Inside three standard errors of what was put in."""
+    loop = demo("hidden_friction")
     report = loop.main(tmp_path)
     (effect,) = report["effects"]
     assert (effect["name"], effect["variant"]) == (loop.HIDDEN.name, loop.HIDDEN.label)
     for key, value in loop.HIDDEN.values.items():
         assert abs(effect["parameters"][key] - value) < 3.0 * effect["std"][key]
     assert report["error"]["after"]["holdout"] < 1.15 * loop.NOISE
+    assert (tmp_path / "hidden_friction.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_the_loop_is_closed(tmp_path):
+    """Laws on no list, from readings to a drape: it is the true law's within what the run states.
+
+    Force and stiffness inside three standard errors, and the angles, whose errors go together,
+    inside twice the root mean square that is stated for them.
+    """
+    loop = demo("close_the_loop")
+    found = loop.main(tmp_path)
+    frames, strips = found["report"]["tests"].values()
+    assert [frames["verdict"], strips["verdict"]] == 2 * ["effect_discovered"]
+    acts = [(t["acts_on"], t["depends_on"]) for r in (frames, strips) for t in r["discovered"]]
+    assert acts == [("moment", ["largest_angle"]), ("rest_curvature", ["arc_length"])]
+    for report, noise in ((frames, loop.FORCE_NOISE), (strips, loop.HEIGHT_NOISE)):
+        assert report["error"]["after"]["holdout"] < 1.2 * noise
+    model = strips["model"]
+    assert abs(model["parameters"]["C1_MPa"] - loop.C1) < 3.0 * model["std"]["C1_MPa"]
+    forces = {n: r["quantities"]["punch_force_N"] for n, r in found["drapes"].items()}
+    uncertain = found["drapes"]["found"]["uncertainty"]
+    std = uncertain["quantities"]["punch_force_N"]["fit"]
+    assert abs(forces["found"] - forces["truth"]) < 3.0 * std
+    (stated,) = (r["fit_deg"] for r in uncertain["regions"] if r["region"] == "all")
+    truth = loop.angles(tmp_path, "truth")
+    off = {n: np.sqrt(np.mean((loop.angles(tmp_path, n) - truth).to_numpy() ** 2)) for n in forces}
+    assert off["found"] < 2.0 * stated
+    # What the discovery was for.
+    assert abs(forces["baseline"] - forces["truth"]) > 20.0 * std
+    assert off["baseline"] > 20.0 * off["found"]
     assert (tmp_path / "close_the_loop.png").stat().st_size > 10_000
 
 

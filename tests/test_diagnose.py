@@ -280,11 +280,13 @@ def test_a_drape_takes_the_shear_law_of_the_frames(diagnosed, tmp_path, monkeypa
     assert report["test"] == "drape" and list(report["tests"]) == ["picture_frame", "drape"]
     assert report["verdict"] == "no_effect" and report["baseline"]["parameters"] == {}
     assert report["error"]["quantity"] == "angle_deg"
-    # Friction is the fabric's and not in the drape: the baseline's own fit is nearer.
-    law = report["tests"]["picture_frame"]["baseline"]["parameters"]
+    # Friction is the fabric's: it is in the drape, and the springs beside it.
+    law = report["tests"]["picture_frame"]["model"]["parameters"]
     crossover = cases[0].crossover
-    assert (crossover.k1_N_mm, crossover.k3_N_mm) == (law["k1_N"], law["k3_N"])
-    assert crossover.dashpot_N_s_mm == law["c1_N_s"]
+    assert [one.law for one in crossover.laws] == ["dahl_friction"]
+    assert crossover.laws[0].limit_N_mm == pytest.approx(law["m_c_N"])
+    taken = (crossover.k1_N_mm, crossover.k3_N_mm, crossover.dashpot_N_s_mm)
+    assert taken == pytest.approx([law[name] for name in ("k1_N", "k3_N", "c1_N_s")])
     assert sum("fitted to the other tests" in note for note in report["notes"]) == 1
     text = (tmp_path / "out/report.html").read_text()
     assert text.count("<section>") == 2 and (tmp_path / "out/drape_data.png").exists()

@@ -30,6 +30,7 @@ from fabric_fenicsx.loop.report.content import test_report as report_of
 from fabric_fenicsx.loop.synthesise import Hidden, synthesise, write_measurement
 from fabric_fenicsx.rigs.common import Session, control
 from fabric_fenicsx.rigs.drape import DrapeCase, build
+from fabric_fenicsx.rigs.fabric_file import FabricFile, areal_density
 from fabric_fenicsx.rigs.simulation import simulate
 from fabric_fenicsx.solving.contacts import ContactLaw
 
@@ -296,16 +297,34 @@ def test_the_law_of_other_tests_is_taken(tmp_path):
     x, y = marks()
     measurement = written(tmp_path, x, y, angle(x, y))
     drape = Drape([measurement], solve=lambda c: cases.append(c) or made_up(c), net=None)
-    law = {"k1_N": -0.01, "k3_N": 0.05, "c1_N_s": 1.0}
-    drape.take({"picture_frame": law, "cantilever": {"C1_MPa": 2000.0}})
+    friction = {"law": "dahl_friction", "limit_N_mm": 0.01, "stick_angle_deg": 2.0}
+    fabric = {
+        "schema": "fabric/1",
+        "fabric": {"areal_density_kg_m2": 0.5, "tow_spacing_mm": 6.0},
+        "tow": {"width_mm": 3.0, "height_mm": 0.1, "C1_MPa": 2000.0},
+        "crossover": {
+            "k1_N_mm": 0.0,
+            "k3_N_mm": 0.05,
+            "dashpot_N_s_mm": 1.0,
+            "laws": [friction],
+        },
+        "tests": [{"test": "picture_frame", "titles": [""], "verdict": "effect_found"}],
+    }
+    drape.take(FabricFile.model_validate(fabric))
     drape.predict((), {})
     crossover = cases[0].crossover
     assert (crossover.k1_N_mm, crossover.k3_N_mm, crossover.dashpot_N_s_mm) == (0.0, 0.05, 1.0)
-    assert cases[0].tow.C1_MPa == 2000.0
-    assert "fitted to the other tests" in drape.notes[0]
+    assert [law.law for law in crossover.laws] == ["dahl_friction"]
+    assert "and dahl_friction (fitted to the other tests)" in drape.notes[0]
+    # Without a strip the tow stays the drape's own.
+    assert cases[0].tow.C1_MPa == measurement.fabric.tow.C1_MPa
+    fabric["tests"] += [{"test": "cantilever", "titles": [""], "verdict": "no_effect"}]
+    drape.take(FabricFile.model_validate(fabric))
+    case = drape._case(measurement, {})
+    assert (case.tow.C1_MPa, case.tow.per_width_mm) == (2000.0, 6.0)
     assert "fitted to the other tests" in drape.notes[1]
-    assert any("k1_N = -0.01" in note and "negative" in note for note in drape.notes)
-    assert not any("k3_N" in note for note in drape.notes)
+    # The sheet weighs what was draped.
+    assert areal_density(case) == pytest.approx(measurement.fabric.areal_density_kg_m2)
 
 
 def test_the_case_weighs_what_the_fabric_does(tmp_path):

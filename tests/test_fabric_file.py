@@ -391,16 +391,23 @@ def test_from_readings_to_the_frame_again(tmp_path):
     r = np.array(file.correlations)[np.ix_(place, place)]
     size = np.linalg.norm(root, axis=1)
     assert r == pytest.approx(root @ root.T / np.outer(size, size), abs=1e-9)
+    assert_the_net_is_the_loops(
+        tmp_path, measurement, d.final.variants, d.final.values, fabric=out / "fabric.yaml"
+    )
+
+
+def assert_the_net_is_the_loops(folder, measurement, variants, values, *, crossover=None, **more):
+    """Forces of a whole net within 0.1 % of the largest of the loop's single crossing's."""
     # The net's rates are difference quotients: of small steps.
     finer = {"solver": {**FRAME["solver"], "first_step_s": 1.0, "largest_step_s": 1.0}}
-    case = make_case("picture_frame", **{**FRAME, **finer, "fabric_length_mm": 48.0})
-    result = run(case, tmp_path / "run", fabric=out / "fabric.yaml", pictures=False)
+    of_case = {**FRAME, **finer, "fabric_length_mm": 48.0, "crossover": crossover or {}}
+    result = run(make_case("picture_frame", **of_case), folder / "run", pictures=False, **more)
     assert result["completed"]
-    curve = pd.read_csv(tmp_path / "run" / "curve.csv")
+    curve = pd.read_csv(folder / "run" / "curve.csv")
     read = {name: curve[name].to_numpy() for name in ("time_s", "displacement_mm", "force_N")}
     rig = measurement.rig.model_copy(update={"fabric_length_mm": 48.0})
     again = replace(measurement, rig=rig, runs=(Run("curve.csv", False, "", read),))
-    expected, _ = PictureFrame([again]).predict(d.final.variants, d.final.values)
+    expected, _ = PictureFrame([again]).predict(variants, values)
     # At the start and where the motion turns there are two rates.
     turns = [0.0, 60.0 * 80.0 / 35.0, 60.0 * 80.0 / 35.0 + 20.0]
     away = np.abs(read["time_s"][:, None] - turns).min(axis=1)
@@ -409,6 +416,36 @@ def test_from_readings_to_the_frame_again(tmp_path):
     np.testing.assert_allclose(
         read["force_N"][compared], expected[compared], atol=1e-3 * expected.max()
     )
+
+
+#: Name and label of a term, its coefficients and what else its shape has.
+TERMS = {
+    "spring": ("elastic_moment_of_largest_angle", "largest angle, step", (-0.7,), {"place": 0.4}),
+    "dashpot": ("viscous_moment_of_path", "path, 3 coefficients", (3.0, -9.0, 8.0), {}),
+    "friction": ("dissipative_moment_of_time", "time, saturation", (0.02,), {"0": 0.01}),
+    "memory": ("elastic_moment_of_history", "recent angle, linear", (-0.6,), {}),
+}
+
+
+@pytest.mark.parametrize("term", TERMS)
+def test_a_term_is_in_a_net_what_it_is_in_the_loop(term, tmp_path):
+    """A term without a formula, by its keys in a case: out, a hold and back.
+
+    The dashpot beside it is weak: a net's rate is a difference quotient, off by γ̈ Δt/2.
+    """
+    case = make_case("picture_frame", **FRAME)
+    write_measurement(tmp_path / "frame", synthesise(case, [], 0.02, readings=60))
+    measurement = read_measurement(tmp_path / "frame")
+    name, label, coefficients, others = TERMS[term]
+    effect = next(t for t in PictureFrame([measurement]).terms if t.name == name)
+    variant = next(v for v in effect.variants if v.label == label)
+    values = {"k1_N": 0.03, "k3_N": 0.06, "c1_N_s": 0.2}
+    values |= {p.name: p.starts[0] for p in variant.shapes}
+    values |= {f"{name}_{k}": c for k, c in enumerate(coefficients, start=1)}
+    values |= {f"{name}_{k}": value for k, value in others.items()}
+    entries, _ = law_entries(variant, values, tmp_path)
+    crossover = {"k1_N_mm": 0.03, "k3_N_mm": 0.06, "dashpot_N_s_mm": 0.2, "laws": entries}
+    assert_the_net_is_the_loops(tmp_path, measurement, (variant,), values, crossover=crossover)
 
 
 def test_readings_on_one_curve_are_a_table(tmp_path):

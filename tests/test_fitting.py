@@ -245,3 +245,24 @@ def test_what_others_can_stand_for_is_on_no_bound():
     assert fit(line, (), {"a": 0.5, "b": 0.3}, rows, UNIT).at_bound == ("b",)
     line.columns["b"] = np.zeros(70)
     assert fit(line, (), {"a": 0.5, "b": 0.3}, rows, UNIT).at_bound == ("b",)
+
+
+def test_walds_statistic_is_that_of_what_is_known():
+    """Against r Σ⁻¹ r by dense matrices; what the readings do not tell has no part in it."""
+    rng = np.random.default_rng(2)
+    t = np.linspace(0.0, 1.0, 40)
+    columns = {"a": t, "b": t + 1e-3 * rng.normal(size=40), "c": np.ones(40), "far": 0.0 * t}
+    data = readings(0.3 * t + 0.05 * rng.normal(size=40))
+    line = Linear(data, columns, tuple(columns))
+    start = {"a": 0.1, "b": 0.2, "c": 0.0, "far": 40.0}
+    model = fit(line, (), start, data.fit, Variances(Noise(0.05)))
+    J = np.column_stack([columns[name] for name in "abc"])
+    covariance = np.linalg.inv(J.T @ J / 0.05**2) * max(1.0, model.sum_of_squares / model.freedom)
+    r = np.array([model.values["a"], model.values["b"]])
+    both = float(r @ np.linalg.solve(covariance[:2, :2], r))
+    assert both > 100.0 * r[0] ** 2 / covariance[0, 0]
+    assert model.wald(["a", "b"], []) == pytest.approx(both, rel=1e-6)
+    assert model.wald(["a", "b", "far"], []) == pytest.approx(both, rel=1e-6)
+    assert model.wald(["a"], []) == pytest.approx(r[0] ** 2 / covariance[0, 0], rel=1e-6)
+    alone = model.values["a"] ** 2 * np.linalg.inv(covariance)[0, 0]
+    assert model.wald(["a"], ["b", "c"]) == pytest.approx(alone, rel=1e-6)

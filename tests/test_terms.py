@@ -1,8 +1,10 @@
 """Terms without a formula: what they depend on, what they are in a net, and that they are found."""
 
 import math
+import warnings
 
 import numpy as np
+import pandas as pd
 import pytest
 from ufl import as_ufl
 
@@ -10,6 +12,7 @@ from fabric_fenicsx.inputs.python_file import classes_of, run_file
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.terms import terms
+from fabric_fenicsx.loop.report.discovered import _shortest
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw
 from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw, shape_of
 
@@ -142,6 +145,24 @@ def test_terms_cover_the_contract():
         assert all(name.startswith(term.name) for name in names)
     for acts_on, variables in found.items():
         assert variables >= set(allowed[acts_on].split()) - {"run"}, acts_on
+
+
+@pytest.mark.parametrize(
+    ("place", "width", "formula"),
+    [
+        (70.0, 20.0, "(-0.01 exp(−((arc length − 70 mm)/20 mm)²))"),
+        # Of one that begins at once what it is there is taken off.
+        (50.0, 50.0, "(-0.01 (exp(−((arc length − 50 mm)/50 mm)²) − 0.37))"),
+    ],
+)
+def test_a_bump_has_a_formula(place, width, formula):
+    """And none of the others that are tried warns of its numbers."""
+    x = np.linspace(0.0, 250.0, 101)
+    value = -0.01 * (np.exp(-(((x - place) / width) ** 2)) - np.exp(-((place / width) ** 2)))
+    table = pd.DataFrame({"arc_length_mm": x, "rest_1_mm": value, "std_rest_1_mm": 1e-5 + 0.0 * x})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert _shortest(table) == formula
 
 
 # A frame with a spring that wears: made up without the package's laws. -------------------------

@@ -16,6 +16,7 @@ from .diagnose import diagnose
 from .doctor import doctor
 from .export import export
 from .fibres import fibres
+from .import_data import import_data
 from .keys import keys
 from .kinematic import kinematic
 from .map import map
@@ -76,6 +77,10 @@ EXAMPLES: dict[Callable[..., None], list[str]] = {
         "map results/drape part.stl --out part.vtu",
     ],
     export: ["export results/drape net.vtk"],
+    import_data: [
+        "import export.txt --as picture_frame --out my_frame",
+        'import *.txt --as cantilever --constant length_mm=200 --column z_mm="Y [mm]" --out strip',
+    ],
     diagnose: ["diagnose my_fabric", "diagnose frame strip --effects crossover_friction"],
     synthesise: [
         "synthesise demos/picture_frame.yaml --effect crossover_friction --noise 0.02 --out mine"
@@ -86,6 +91,8 @@ EXAMPLES: dict[Callable[..., None], list[str]] = {
 for command, lines in EXAMPLES.items():
     label = "Example: " if len(lines) == 1 else "Examples: "
     app.command(
+        # `import` is no name of a function.
+        name=command.__name__.removesuffix("_data"),
         # Typer keeps the line ends of a docstring; a terminal has its own.
         help="\n\n".join(
             " ".join(p.split()) for p in cleandoc(command.__doc__ or "").split("\n\n")

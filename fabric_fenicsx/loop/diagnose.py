@@ -13,7 +13,7 @@ from mpi4py import MPI
 from ..errors import FitError, InputError, SolveError
 from ..inputs.keys import one_of
 from ..output.folder import prepare_folder
-from .fabric import fabric_content, write_fabric
+from .fabric import fabric_content, fabric_file, write_fabric
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect
 from .inference.experiment import Experiment
@@ -111,7 +111,8 @@ def diagnose(
             progress((number + share) / len(tests), what)
 
         if kind.needs_others:
-            experiment.take(_fitted(diagnosis for diagnosis, _, _ in parts))
+            if parts:
+                experiment.take(fabric_file(_with_measurements(parts, tests), folder or Path()))
             _try_out(experiment, own)
         try:
             diagnosis = diagnose_test(experiment, effects, part)
@@ -131,8 +132,7 @@ def diagnose(
         terms = discovered_terms(diagnosis, 1 + sum(len(found) for _, _, found in parts))
         parts.append((diagnosis, test_report(diagnosis, same, advice, terms), terms))
     report = combined_report([content for _, content, _ in parts])
-    found = [(d, same) for (d, _, _), (_, same, _) in zip(parts, tests, strict=True)]
-    fabric = fabric_content(found, folder or Path())
+    fabric = fabric_content(_with_measurements(parts, tests), folder or Path())
     if folder is not None:
         progress(1.0, "drawing")
         write_fabric(folder, fabric)
@@ -164,18 +164,11 @@ def _experiments(
     return tests
 
 
-def _fitted(earlier: Any) -> Mapping[str, Mapping[str, float]]:
-    """What earlier tests say of the fabric, by test.
-
-    An effect of the rig is taken out: the law beside it is the fabric's. An effect of the fabric
-    the next test has not got, so that the baseline's own fit, which imitates it, is nearer.
-    """
-    return {
-        d.experiment.test: (
-            d.baseline if any(effect.of_fabric for effect in d.effects) else d.final
-        ).values
-        for d in earlier
-    }
+def _with_measurements(
+    parts: Sequence[tuple[Diagnosis, dict[str, Any], list[Discovered]]], tests: Sequence[Test]
+) -> list[tuple[Diagnosis, list[Measurement]]]:
+    """The diagnoses so far, each with what it is of."""
+    return [(d, same) for (d, _, _), (_, same, _) in zip(parts, tests, strict=False)]
 
 
 def _check_names(names: Sequence[str] | None, tests: Sequence[Test]) -> None:

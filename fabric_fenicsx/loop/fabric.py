@@ -24,7 +24,7 @@ from ..mechanics.laws import LAWS
 from ..mechanics.laws.law import CrossingLaw
 from ..mechanics.laws.tabulated import TabulatedSpring
 from ..output.files import write_text
-from ..rigs.fabric_file import FILE, SCHEMA
+from ..rigs.fabric_file import FILE, SCHEMA, FabricFile
 from .inference.curve import Curve
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect, Variant
@@ -33,7 +33,7 @@ from .measurement.schema import Measurement
 from .report.content import scatter
 from .report.plausibility import correlation_of
 
-__all__ = ["fabric_content", "law_entries", "write_fabric"]
+__all__ = ["fabric_content", "fabric_file", "law_entries", "write_fabric"]
 
 Array = npt.NDArray[np.float64]
 
@@ -126,6 +126,13 @@ def fabric_content(
     for name in ("not_of_the_fabric", "without_a_key"):
         content[name] = [entry for part in parts for entry in part.others[name]]
     return _rounded(content)
+
+
+def fabric_file(
+    tests: Sequence[tuple[Diagnosis, Sequence[Measurement]]], folder: Path
+) -> FabricFile:
+    """The same as a case takes it; see fabric_content."""
+    return FabricFile.model_validate(fabric_content(tests, folder), context={"base": folder})
 
 
 def write_fabric(folder: Path, content: Mapping[str, Any]) -> None:

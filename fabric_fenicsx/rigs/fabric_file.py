@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,7 @@ __all__ = [
 ]
 
 Array = npt.NDArray[np.float64]
+AnyCase = TypeVar("AnyCase", bound=Case)
 
 SCHEMA = "fabric/1"
 FILE = "fabric.yaml"
@@ -186,7 +187,7 @@ def moved(fabric: FabricFile, change: Array) -> FabricFile:
         raise ValueError(str(error)) from error
 
 
-def with_fabric(case: Case, fabric: FabricFile) -> Case:
+def with_fabric(case: AnyCase, fabric: FabricFile) -> AnyCase:
     """A case with what the file has in the place of its own section, weight and crossings.
 
     Raises:
@@ -317,9 +318,9 @@ def _add(data: Any, dotted: str, factor: float | list[float], by: float) -> None
         data[last] = value + factor * by
 
 
-def _checked(case: Case, data: dict[str, Any]) -> Case:
+def _checked(case: AnyCase, data: dict[str, Any]) -> AnyCase:
     found, problems = mistakes(type(case), data)
     if problems:
         raise InputError(one_line(problems[0][1]))
-    checked: Case = found
+    checked: AnyCase = found
     return checked

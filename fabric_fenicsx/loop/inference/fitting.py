@@ -156,8 +156,12 @@ class Fit:
         # What the known ones leave of the independent combinations.
         left = own - own @ np.linalg.pinv(given) @ given if len(known) else own
         found = np.array([self.values[n] for n in names])
+        # In errors, however different: of what nothing depends on there is none.
+        errors = np.linalg.norm(left, axis=1)
+        known_at_all = (errors > 0.0) & np.isfinite(errors)
+        own, found, errors = left[known_at_all], found[known_at_all], errors[known_at_all]
         # Smallest combination of the independent ones that takes them there: zero where none does.
-        least = np.linalg.lstsq(left, found, rcond=1e-10)[0]
+        least = np.linalg.lstsq(own / errors[:, None], found / errors, rcond=1e-8)[0]
         return float(least @ least) / self._misfit**2
 
     @property

@@ -72,7 +72,7 @@ class Kind:
             effects, and its ``options`` by name. None: there is no such trial.
         options: what only this kind's ``made_up`` takes by name.
         proposals: from measurements of this kind to runs that its rig could do next.
-        needs_others: its model takes what was fitted to kinds before it (``Experiment.take``).
+        needs_others: its model takes the fabric that kinds before it found (``take``).
         scattered: readings lie all over a sheet, on no line.
     """
 

@@ -19,7 +19,7 @@ from ...inputs.validation import read_keys
 from .kind import Kind
 from .schema import FILE, SCHEMA, Measurement, MeasurementKeys, Run, RunKeys
 
-__all__ = ["read_folder", "write_folder"]
+__all__ = ["measurement_models", "read_folder", "write_folder"]
 
 Array = npt.NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def read_folder(folder: Path, kinds: Sequence[Kind]) -> Measurement:
         what = "is a file" if folder.exists() else "no such folder"
         raise InputError(f"{folder}: {what}, allowed is a folder with a {FILE}")
     path = folder / FILE
-    keys = read_keys(path, "a measurement", SCHEMA, "test", _models(kinds))
+    keys = read_keys(path, "a measurement", SCHEMA, "test", measurement_models(kinds))
     kind = next(kind for kind in kinds if kind.name == keys.test)
     if problem := _problem(keys, kind):
         raise InputError(f"{path}: {problem}")
@@ -64,7 +64,7 @@ def read_folder(folder: Path, kinds: Sequence[Kind]) -> Measurement:
     return Measurement(folder, kind.name, keys.title, keys.fabric, keys.rig, noise, tuple(runs))
 
 
-def _models(kinds: Sequence[Kind]) -> dict[str, type[MeasurementKeys]]:
+def measurement_models(kinds: Sequence[Kind]) -> dict[str, type[MeasurementKeys]]:
     """The keys of a measurement of each kind."""
     # More than a kind's own noise may be kept in one place for several kinds.
     sigmas: dict[str, Any] = {

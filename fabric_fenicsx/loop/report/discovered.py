@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from scipy.optimize import curve_fit
+from scipy.optimize import OptimizeWarning, curve_fit
 
 from ...mechanics.scalars import derivative_of, numpy_function, symbol
 from ..inference.diagnosis import Diagnosis
@@ -139,6 +140,11 @@ def _formulas(v: str, unit: str, reach: float) -> Iterator[_Formula]:
         lambda a, b, w: f"{a:.3g} s(({v} − {at(b)})/{at(w)}), s(y) = 1/(1 + exp(−y))",
     )
     yield _Formula(
+        lambda x, a, b, w: a * (np.exp(-(((x - b) / w) ** 2)) - np.exp(-((b / w) ** 2))),
+        ((1.0, 0.3, 0.1), (1.0, 0.6, 0.1)),
+        lambda a, b, w: f"{a:.3g} {_bump(f'{v} − {at(b)}', at(abs(w)), np.exp(-((b / w) ** 2)))}",
+    )
+    yield _Formula(
         lambda x, a, b, n: a * np.sin(2.0 * np.pi * n * x) + b * (np.cos(2.0 * np.pi * n * x) - 1),
         tuple((1.0, 0.1, n) for n in np.arange(1.0, 16.0, 0.25)),
         lambda a, b, n: (
@@ -146,6 +152,12 @@ def _formulas(v: str, unit: str, reach: float) -> Iterator[_Formula]:
             f"{np.hypot(a, b) * np.sin(np.arctan2(b, a)):.2g}"
         ),
     )
+
+
+def _bump(place: str, width: str, at_zero: float) -> str:
+    """A Gaussian, less what it is where the variable is nothing."""
+    text = f"exp(−(({place})/{width})²)"
+    return f"({text} − {at_zero:.2g})" if at_zero > SHARE else text
 
 
 def _shortest(table: pd.DataFrame) -> str:
@@ -161,12 +173,16 @@ def _shortest(table: pd.DataFrame) -> str:
     size = float(np.ptp(own)) or 1.0
     allowed = np.maximum(SIGMAS * std, SHARE * size)
     start = float(own[0])
+    # As far as it goes from there, either way.
+    far = float(own[np.argmax(np.abs(own - start))]) - start or size
     best: tuple[int, float, str] | None = None
     for formula in _formulas(v, unit, reach):
         for guess in formula.starts:
-            scaled = (guess[0] * (own[-1] - start or size), *guess[1:])
+            scaled = (guess[0] * far, *guess[1:])
             try:
-                with np.errstate(all="ignore"):
+                with np.errstate(all="ignore"), warnings.catch_warnings():
+                    # Only how near it is matters, not what is known of its numbers.
+                    warnings.simplefilter("ignore", OptimizeWarning)
                     found, _ = curve_fit(
                         formula.value, x, own - start, scaled, sigma=allowed, maxfev=500
                     )

@@ -47,6 +47,8 @@ REACH = 1e3
 STEEPEST = 5.0
 #: Points of a law that is shown.
 LAW_POINTS = 201
+#: Times the baseline's largest curvature up to which a law is looked at at all.
+FAR = 10
 #: Points on a predicted line among which the nearest to a reading is looked for.
 FINE = 400
 
@@ -144,7 +146,7 @@ class Cantilever:
         self.readings = readings_of(
             measurements, self._observed, covariates, weight=weight, chain=chain
         )
-        self._largest_curvature = curvature
+        self._largest_curvature, self._largest_moment = curvature, moment
         shares = {"curvature": curvature, "moment": moment}
         self.effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
 
@@ -283,8 +285,11 @@ class Cantilever:
                 for own in self._specimens
             ]
         except SolveError:
-            # From where the strips were left last there may be no way; the baseline's is near.
-            return self._largest_curvature
+            # From where the strips were left last there may be no way. The moment at a clamp goes
+            # by where the strip is, so that the baseline's is near, and not so its curvature.
+            kappa = np.linspace(0.0, FAR * self._largest_curvature, FAR * LAW_POINTS)
+            bent = self._law_at(kappa, variants, values).value >= self._largest_moment
+            return float(kappa[np.argmax(bent)]) if bent.any() else self._largest_curvature
         return max(float(np.abs(shape.curvature).max()) for shape in shapes)
 
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
@@ -333,13 +338,18 @@ class Cantilever:
         Where it varies along the strip it is that at the clamp.
         """
         mine = [v for v in variants if isinstance(v, StripVariant)]
-        laws = self._laws(mine, False)
-        kappa = np.linspace(0.0, self._reached(mine, values), LAW_POINTS)
+        return self._law_at(np.linspace(0.0, self._reached(mine, values), LAW_POINTS), mine, values)
+
+    def _law_at(
+        self, kappa: Array, variants: Sequence[StripVariant], values: Mapping[str, float]
+    ) -> Law:
+        """The same at given curvatures."""
+        laws = self._laws(variants, False)
         per_C1 = self.stiffness_per_C1
         longest = max(own.tow.length for own in self._specimens)
         clamp = {
-            "s": Varying(np.zeros(LAW_POINTS)),
-            "length": Varying(np.full(LAW_POINTS, longest)),
+            "s": Varying(np.zeros_like(kappa)),
+            "length": Varying(np.full_like(kappa, longest)),
         }
         moment, slopes = values["C1_MPa"] * per_C1 * kappa, {"C1_MPa": per_C1 * kappa}
         for own in laws.moments:

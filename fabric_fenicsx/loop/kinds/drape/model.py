@@ -29,6 +29,7 @@ from scipy.ndimage import gaussian_filter
 
 from ....errors import SolveError
 from ....rigs.drape import DrapeCase
+from ....rigs.fabric_file import FabricFile, with_fabric
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Parameter, Variant
 from ...inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
@@ -55,6 +56,8 @@ Array = npt.NDArray[np.float64]
 
 #: Cells between two crossings.
 MESH = 2
+#: Where a law comes from that other tests gave.
+OF_OTHERS = "fitted to the other tests"
 #: Above this [degrees] a reading is no scatter about a right angle: all are made acute.
 OBTUSE = 100.0
 
@@ -108,7 +111,7 @@ class Drape:
         self._filtered: dict[str, ShearField] = {}
         self._unsolved: dict[tuple[str, float], str] = {}
         self._compiled: dict[DrapeVariant, Marched] = {}
-        self._clipped: list[str] = []
+        self._fabric: FabricFile | None = None
         self.use(shear, C1, source)
 
     def use(self, shear: ShearLaw | None, C1: float | None, source: str) -> None:
@@ -122,27 +125,32 @@ class Drape:
         Raises:
             InputError: there is no drape of such a rig, law or C1.
         """
-        self._shear, self._C1, self._source = shear or ShearLaw(), C1, source
+        self._shear, self._C1 = shear or ShearLaw(), C1
         self._shear_source = source if shear is not None else "assumed, as in demos/drape.yaml"
         self._C1_source = source if C1 is not None else "of the measurement's tows"
         for m in self.measurements:
             self._case(m, {})
 
-    def take(self, fitted: Mapping[str, Mapping[str, float]]) -> None:
-        """Take what the baselines of other tests were fitted to, before anything has been solved.
+    def take(self, fabric: FabricFile) -> None:
+        """Take the fabric that other tests found, before anything has been solved.
+
+        Its crossings with their laws and, where strips were measured, its tow; the sheet's weight
+        stays that of the drape's own measurement.
 
         Args:
-            fitted: parameters by test; of a picture frame k1_N, k3_N and c1_N_s are taken, of a
-                cantilever C1_MPa. A negative part of the shear law is left out, and noted.
+            fabric: what the other tests would have a case take.
+
+        Raises:
+            InputError: there is no drape of such a fabric.
         """
-        shear, C1 = None, None
-        if "picture_frame" in fitted:
-            law = {name: fitted["picture_frame"][name] for name in ("k1_N", "k3_N", "c1_N_s")}
-            self._clipped = [f"{name} = {value:.4g}" for name, value in law.items() if value < 0.0]
-            shear = ShearLaw(*(max(value, 0.0) for value in law.values()))
-        if "cantilever" in fitted:
-            C1 = fitted["cantilever"]["C1_MPa"]
-        self.use(shear, C1, "fitted to the other tests")
+        strips = any(test.test == "cantilever" for test in fabric.tests)
+        self._fabric = fabric if strips else fabric.model_copy(update={"tow": None})
+        if self._fabric.crossover is not None:
+            self._shear_source = OF_OTHERS
+        if self._fabric.tow is not None:
+            self._C1_source = OF_OTHERS
+        for m in self.measurements:
+            self._case(m, {})
 
     # Data ---------------------------------------------------------------------------------
 
@@ -265,23 +273,23 @@ class Drape:
     @property
     def notes(self) -> list[str]:
         """What a report must say of the model."""
-        law = self._shear
-        tows = {m.fabric.tow.C1_MPa if self._C1 is None else self._C1 for m in self.measurements}
-        C1 = ", ".join(f"{value:.6g}" for value in sorted(tows))
+        cases = [self._case(m, {}) for m in self.measurements]
+        law = cases[0].crossover
+        C1 = ", ".join(f"{value:.6g}" for value in sorted({case.tow.C1_MPa for case in cases}))
+
+        def beside(laws: Sequence[Any]) -> str:
+            return "".join(f" and {one.model_dump()['law']}" for one in laws)
+
         scatter = float(np.sqrt(np.mean(self.model_scatter**2)))
         error = float(np.sqrt(np.mean(np.sum(self.model_error**2, axis=1))))
         return [
-            f"Shear law m = {law.k1:.4g} γ + {law.k3:.4g} γ³ + {law.c1:.4g} dγ/dt N/mm "
-            f"({self._shear_source}).",
-            f"C1 = {C1} MPa ({self._C1_source}).",
+            f"Shear law m = {law.k1_N_mm:.4g} γ + {law.k3_N_mm:.4g} γ³ + "
+            f"{law.dashpot_N_s_mm:.4g} dγ/dt N/mm{beside(law.laws)} ({self._shear_source}).",
+            f"C1 = {C1} MPa{beside(cases[0].tow.bending)} ({self._C1_source}).",
             f"The model's own error is {error:.2g} degrees rms at these places, alike at places "
             "near each other: from other cells, another spacing of the tows, harder contact and a "
             f"kinematic net. Waves of two spacings, {scatter:.2g} degrees rms, are filtered out "
             "and added to the scatter of a reading.",
-            *(
-                f"{part} was fitted to the picture frame: negative, so that 0 is taken here."
-                for part in self._clipped
-            ),
             *(f"{n} = {a:g}: {why}; left out." for (n, a), why in self._unsolved.items()),
         ]
 
@@ -421,7 +429,12 @@ class Drape:
 
     def _case(self, m: Measurement, changes: Mapping[str, Any]) -> DrapeCase:
         C1 = m.fabric.tow.C1_MPa if self._C1 is None else self._C1
-        return drape_case(m, self._shear, C1, {"sheet.subdivisions": MESH, **changes})
+        case = drape_case(m, self._shear, C1, {"sheet.subdivisions": MESH, **changes})
+        if self._fabric is None:
+            return case
+        density = {"areal_density_kg_m2": m.fabric.areal_density_kg_m2}
+        woven = self._fabric.fabric.model_copy(update=density)
+        return with_fabric(case, self._fabric.model_copy(update={"fabric": woven}))
 
 
 def nearest_next(x: Array, y: Array) -> npt.NDArray[np.int64]:
