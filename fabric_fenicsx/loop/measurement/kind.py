@@ -61,6 +61,7 @@ class Kind:
         run: keys of an entry of ``runs``.
         quantity: what is compared, a column; also the key of its noise.
         label: that, with its unit, as on an axis.
+        besides: further columns whose noise may be given.
         columns: of each CSV file.
         fewest: readings without which a file says nothing.
         experiment: from measurements of this kind and a user's own effects to a model of them;
@@ -88,6 +89,7 @@ class Kind:
         ()
     )
     run: type[RunKeys] = RunKeys
+    besides: tuple[str, ...] = ()
     made_up: Callable[..., MadeUp] | None = None
     options: tuple[str, ...] = ()
     proposals: Callable[[Sequence[Measurement]], list[Proposal]] = lambda measurements: []

@@ -71,6 +71,8 @@ def measurement_models(kinds: Sequence[Kind]) -> dict[str, type[MeasurementKeys]
         kind.quantity: (Positive | None, Field(None, description=f"of the {kind.label}"))
         for kind in kinds
     }
+    for name in (name for kind in kinds for name in kind.besides):
+        sigmas[name] = (Positive | None, Field(None, description=f"of {name}"))
     noise = create_model("NoiseKeys", __base__=Keys, __doc__="One sigma of a reading.", **sigmas)
     models = {}
     for kind in kinds:
@@ -87,7 +89,7 @@ def measurement_models(kinds: Sequence[Kind]) -> dict[str, type[MeasurementKeys]
 def _problem(keys: Any, kind: Kind) -> str | None:
     """What is wrong with keys that are right one by one: the key, and what is allowed."""
     given = [name for name, value in keys.noise if value is not None]
-    if given and kind.quantity not in given:
+    if given and not {kind.quantity, *kind.besides} & set(given):
         return (
             f"noise.{given[0]}: of another test, allowed is {kind.quantity} with test: {kind.name}"
         )

@@ -391,9 +391,11 @@ class BiasExtension(CrossheadTest):
             f"The strips were solved {count} times, with curves m(γ) of their crossings; in "
             "between forces follow to first order, with the angles as they were."
         ]
-        if self._surprises:
-            off = 100.0 * float(np.sqrt(np.mean(np.square(self._surprises))))
-            found.append(f"That foretold the forces of the next strips to {off:.2g} % rms.")
+        if len(self._surprises) > 1:
+            off = 100.0 * float(np.median(self._surprises))
+            found.append(
+                f"That foretold the forces of the next strips to {off:.2g} % rms in the median."
+            )
         found += [f"{key or 'pinned'}: {why}; left out." for key, why in self._failed.items()]
         return found
 
