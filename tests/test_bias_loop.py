@@ -1,4 +1,4 @@
-"""Bias extension in the loop: forces from the way crossings go, against strips of finite elements."""
+"""Bias extension in the loop: forces from the way crossings go, against the net's own."""
 
 from pathlib import Path
 
