@@ -24,8 +24,8 @@ NOTHING = Curve.through(1e-9 * np.radians(KNOTS))
 VALUES = {"k1_N": 0.02, "k3_N": 0.2, "c1_N_s": 0.0}
 
 
-def pulled(speed=1.0, force=None, count=25, length=LENGTH, back=False, **more):
-    """A run out, and back if so wanted, at one speed [mm/s]."""
+def pulled(speed=1.0, force=None, count=29, length=LENGTH, back=False, **more):
+    """A run out, and back if so wanted, at one speed [mm/s], read at the steps of the net."""
     D = np.linspace(0.0, TRAVEL, count)
     D = np.concatenate([D, D[-2::-1]]) if back else D
     time = np.arange(len(D)) * (D[1] - D[0]) / speed
@@ -109,7 +109,7 @@ def test_a_dashpot_costs_its_work():
     ],
 )
 def test_slopes_are_differences(effect, label, monkeypatch):
-    test = BiasExtension([measured(pulled(force=np.linspace(0.0, 20.0, 25)))])
+    test = BiasExtension([measured(pulled(force=np.linspace(0.0, 20.0, 29)))])
     (variant,) = (
         v for e in test.effects if e.name == effect for v in e.variants if v.label == label
     )

@@ -114,6 +114,8 @@ class BiasExtension(CrossheadTest):
         columns = np.arange(len(runs))
         self._speed = self._furthest / np.maximum(time[out, columns] - time[0], 1e-9)
         self._groups: list[npt.NDArray[np.int64]] | None = None
+        for (m, run), travel, speed in zip(runs, self._furthest, self._speed, strict=True):
+            strip_case(m, run, float(travel), float(speed), {})
         # Of the curve that laws with memory and dashpots follow, the same throughout.
         angles = [
             _strip(m, run).angle(0.5 * D) for (m, run), D in zip(runs, self._furthest, strict=True)

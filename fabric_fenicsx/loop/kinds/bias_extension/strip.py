@@ -153,10 +153,9 @@ def strip_case(
         return BiasExtensionCase.model_validate(keys)
     except ValidationError as error:
         first = error.errors()[0]
-        name = ".".join(map(str, first["loc"]))
-        raise InputError(
-            f"{measurement.folder / FILE}: {run.file}: {name}: {first['msg']}"
-        ) from error
+        key = "".join(f"{part}: " for part in first["loc"])
+        said = f"{key}{first['msg'].removeprefix('Value error, ')}"
+        raise InputError(f"{measurement.folder / FILE}: {run.file}: {said}") from error
 
 
 def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:
