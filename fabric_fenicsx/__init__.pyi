@@ -3,6 +3,7 @@
 from .errors import FitError as FitError
 from .errors import InputError as InputError
 from .errors import SolveError as SolveError
+from .fabric.bias_strip import BiasStrip as BiasStrip
 from .fabric.crossings import crossing_numbers as crossing_numbers
 from .fabric.crossings import reference_angle as reference_angle
 from .fabric.gmsh_io import read_msh as read_msh

@@ -20,7 +20,8 @@ class Parameter:
         meaning: one line for the report.
         share_of: "duration", "angle", "rate" or "travel": starts and bounds are shares of the
             longest run, or of the largest shear angle, rate or displacement in the data;
-            "typical_rate": of the median rate; "force": of the largest reading; of a
+            "typical_rate": of the median rate; "force": of the largest reading; of a strip that is
+            pulled "per_tow_force": of one over the largest force on a tow; of a
             cantilever "curvature" or "moment", the largest of them in the fitted baseline.
         jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
             for on both sides.

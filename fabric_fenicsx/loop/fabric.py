@@ -45,7 +45,11 @@ BASELINE = {
 }
 """Keys of what every fabric has, by the parameter that is fitted."""
 
-PLACES = {"picture_frame": "crossover.laws", "cantilever": "tow.bending"}
+PLACES = {
+    "picture_frame": "crossover.laws",
+    "bias_extension": "crossover.laws",
+    "cantilever": "tow.bending",
+}
 """Where the laws of a test go."""
 
 CURVE_POINTS = 13

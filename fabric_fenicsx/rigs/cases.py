@@ -89,6 +89,12 @@ class TowKeys(Keys):
         description="moments per width beside that of the section, which is the stiffness left "
         "where fibres slip; any of these as often as there are causes",
     )
+    crimp_strain: NotNegative = Field(
+        0.0, description="by which tows lengthen as their crimp is drawn out; 0: straight tows"
+    )
+    crimp_stiffness_share: Annotated[float, Field(gt=0.0, le=1.0)] = Field(
+        0.01, description="of the stretch stiffness, until the crimp is out"
+    )
     bundle: BundleKeys | None = Field(None, description="only with section_law: bundle")
     shear_correction: Positive = Field(5.0 / 6.0, description="factor on the shear stiffness")
     relaxation_time_s: NotNegative = Field(

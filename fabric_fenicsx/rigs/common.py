@@ -22,6 +22,7 @@ from ..fabric.net import WARP, WEFT, Net
 from ..fabric.paths import TowPaths
 from ..fabric.section import BundleSection, FabricSection, RectangularSection, Section
 from ..mechanics.laws.law import CrossingLaw
+from ..mechanics.stretch_laws import Uncrimping
 from ..output.files import write_text
 from ..parallel import from_root
 from ..solving.model import Model
@@ -189,11 +190,13 @@ def fabric_model(
     sections, kind = tow_sections(case, net, spacings)
     families = [WARP, WEFT, *(WARP if t.family == "warp" else WEFT for t in case.tow_types)]
     laws = tuple(keys.build() for keys in case.tow.bending)
+    crimp = case.tow.crimp_strain, case.tow.crimp_stiffness_share
     return Model(
         net,
         sections,
         tow_section=kind,
         bending=Bending(laws, tuple(spacings[family] for family in families)),
+        uncrimping=Uncrimping(*crimp) if crimp[0] else None,
         section_law="linear" if case.tow.section_law == "bundle" else case.tow.section_law,
         crossovers=crossover_law(case.crossover, spacings[0] * spacings[1], session.laws),
         comm=session.comm,

@@ -19,8 +19,8 @@ from pydantic import Field, model_validator
 from ..fabric.net import Net
 from ..fabric.paths import TowPaths
 from ..fabric.sheet import Sheet
-from ..inputs.groups import NotNegative, Positive
-from .cases import PlainWeaveCase
+from ..inputs.groups import Positive
+from .crosshead import CrossheadCase, crosshead, duration, turns
 from .rig import Compared, Rig
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ __all__ = [
     "RIG",
     "PictureFrameCase",
     "build",
-    "crosshead",
     "frame_angle",
     "frame_ends",
     "normalised_force",
@@ -43,16 +42,13 @@ __all__ = [
 Array = npt.NDArray[np.float64]
 
 
-class PictureFrameCase(PlainWeaveCase):
+class PictureFrameCase(CrossheadCase):
     """A hinged square frame shears the fabric whose tows are pinned to its bars."""
 
     test: Literal["picture_frame"]
     frame_length_mm: Positive = Field(192.0, description="L_frame, between the hinges of a bar")
     fabric_length_mm: Positive = Field(96.0, description="L_fabric, side of the woven square")
-    rate_mm_min: Positive = Field(35.0, description="speed of the crosshead")
     travel_mm: Positive = Field(94.7, description="of the crosshead; 94.7 mm is 55 degrees")
-    hold_s: NotNegative = Field(180.0, description="time at rest before the way back")
-    unload: bool = Field(True, description="move back to the square")
 
     @model_validator(mode="after")
     def _fits(self) -> PictureFrameCase:
@@ -92,23 +88,6 @@ def normalised_force(force: Any, gamma: Any, frame_length: float, fabric_length:
     """F_normalised [N/mm] of a crosshead force [N] at a shear angle (eqs. 4 and 5)."""
     theta = np.pi / 4.0 - gamma / 2.0
     return force / (2.0 * np.cos(theta)) * frame_length / fabric_length**2
-
-
-def crosshead(case: PictureFrameCase, time: float) -> float:
-    """Crosshead displacement D [mm]: out at a constant rate, at rest, and back."""
-    rate = case.rate_mm_min / 60.0
-    out = case.travel_mm / rate
-    if time <= out:
-        return rate * time
-    if time <= out + case.hold_s or not case.unload:
-        return case.travel_mm
-    return max(case.travel_mm - rate * (time - out - case.hold_s), 0.0)
-
-
-def duration(case: PictureFrameCase) -> float:
-    """Length of the whole test [s]."""
-    out = 60.0 * case.travel_mm / case.rate_mm_min
-    return out + case.hold_s + (out if case.unload else 0.0)
 
 
 def directions(gamma: float) -> tuple[Array, Array]:
@@ -170,7 +149,6 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
 
     model = build(case, session)
     frame, fabric = case.frame_length_mm, case.fabric_length_mm
-    end = duration(case)
 
     def measure(snapshot: Snapshot) -> dict[str, float]:
         D = crosshead(case, snapshot.time)
@@ -184,14 +162,12 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
             "largest_out_of_plane_mm": float(np.abs(snapshot.displacement[:, 2]).max()),
         }
 
-    out = 60.0 * case.travel_mm / case.rate_mm_min
-    turns = (out, out + case.hold_s) if case.hold_s else (out,)
     outcome = simulated(
         case,
         model,
         session,
-        end=end,
-        stops=[t for t in turns if t < end],
+        end=duration(case),
+        stops=turns(case),
         control=control(case.solver),
         measure=measure,
     )

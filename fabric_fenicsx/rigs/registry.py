@@ -15,6 +15,7 @@ __all__ = ["RIGS", "rig"]
 RIGS = (
     "drape",
     "picture_frame",
+    "bias_extension",
     "cantilever",
 )
 """Their names, which are those of their files and what `test` says in a case."""

@@ -19,6 +19,7 @@ from ..fabric.section import Section
 from ..mechanics import beam, inertia
 from ..mechanics.fields import ConnectorFields, TowFields
 from ..mechanics.section_laws import with_viscosity
+from ..mechanics.stretch_laws import Uncrimping
 from ..mechanics.terms import Term, work_term
 from ..mechanics.tools import Tool
 from .contacts import ContactLaw, Contacts
@@ -70,6 +71,7 @@ class Model:
         section_law: "linear" takes the sections' stiffness at zero strain, "neo_hookean" the
             whole energy of rectangular ones, "neo_hookean_fibres" with stretch by twist.
         bending: moments beside those of the sections.
+        uncrimping: how crimp softens the tows' stretch; None: straight tows.
         crossovers: law of the crossings; not needed where the net has none.
         gravity: acceleration [mm/s²].
         load: factor on gravity at a time; by default 1.
@@ -99,6 +101,7 @@ class Model:
         tow_section: npt.NDArray[np.int64] | None = None,
         section_law: SectionLawName = "linear",
         bending: Bending = STRAIGHT,
+        uncrimping: Uncrimping | None = None,
         crossovers: CrossoverLaw | None = None,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         load: Callable[[float], float] = lambda time: 1.0,
@@ -131,7 +134,7 @@ class Model:
         self.fields = self.disc.tows
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
         self._full_gravity, self._load = np.array(gravity), load
-        self.elastic = elastic_section(self.disc, sections, kind, section_law, bending)
+        self.elastic = elastic_section(self.disc, sections, kind, section_law, bending, uncrimping)
         self._constants(mass_scale)
         self.histories = Histories(self.disc)
         self.histories.add("strain", "cells", self.fields.strain_n, beam.strain(self.fields))

@@ -15,6 +15,7 @@ from ..fabric.section import FabricSection, RectangularSection, Section
 from ..mechanics.bending_laws import BendingLaw, bent_section
 from ..mechanics.neo_hookean import neo_hookean_section
 from ..mechanics.section_laws import LINEAR, PACKED, ElasticSection, coupled_section
+from ..mechanics.stretch_laws import Uncrimping, uncrimped_section
 from .discretisation import Discretisation
 
 __all__ = ["STRAIGHT", "Bending", "SectionLawName", "diagonals", "elastic_section"]
@@ -50,6 +51,7 @@ def elastic_section(
     kind: npt.NDArray[np.int64],
     law: SectionLawName,
     bending: Bending = STRAIGHT,
+    uncrimping: Uncrimping | None = None,
 ) -> ElasticSection:
     """The law of all tows: the simplest that covers every section.
 
@@ -60,11 +62,15 @@ def elastic_section(
         law: "linear" for the stiffness at zero strain, "neo_hookean" for the whole energy,
             "neo_hookean_fibres" with the stretch of a flat tow's fibres in twist.
         bending: moments that are added.
+        uncrimping: how crimp softens the tows' stretch; None: straight tows.
 
     Raises:
         ValueError: an unknown law, or a section that the Neo-Hookean law does not know.
     """
     mesh = disc.tows.mesh
+    if uncrimping is not None:
+        base = elastic_section(disc, sections, kind, law, bending)
+        return uncrimped_section(base, uncrimping, partial(_dolfinx.constant, mesh))
     if bending.laws:
         base = elastic_section(disc, sections, kind, law)
         widths = np.array(bending.widths)[kind][:, None]

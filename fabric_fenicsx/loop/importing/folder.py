@@ -144,7 +144,7 @@ def _check(
 ) -> None:
     """Read what was written as a diagnosis does; a mistake is told of the export it is from."""
     try:
-        if target.diagnosed and not missing:
+        if not missing:
             read_folder(staged, KINDS)
             return
         for file in runs:

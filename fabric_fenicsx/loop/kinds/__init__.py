@@ -4,13 +4,14 @@
 """
 
 from ..measurement.kind import Kind
+from .bias_extension import BIAS_EXTENSION
 from .cantilever import CANTILEVER
 from .drape import DRAPE
 from .picture_frame import PICTURE_FRAME
 
 __all__ = ["KINDS", "kind_of"]
 
-KINDS = (PICTURE_FRAME, CANTILEVER, DRAPE)
+KINDS = (PICTURE_FRAME, BIAS_EXTENSION, CANTILEVER, DRAPE)
 
 
 def kind_of(test: str) -> Kind:

@@ -14,7 +14,7 @@ from ...inputs.groups import Keys
 from ...inputs.tables import Column
 from ..inference.experiment import Experiment
 from .proposal import Proposal
-from .schema import Measurement
+from .schema import Measurement, RunKeys
 
 __all__ = ["Kind", "MadeUp", "Mistake", "called_later"]
 
@@ -58,8 +58,10 @@ class Kind:
     Attributes:
         name: as ``test`` in a measurement.yaml.
         rig: keys of its rig.
+        run: keys of an entry of ``runs``.
         quantity: what is compared, a column; also the key of its noise.
         label: that, with its unit, as on an axis.
+        besides: further columns whose noise may be given.
         columns: of each CSV file.
         fewest: readings without which a file says nothing.
         experiment: from measurements of this kind and a user's own effects to a model of them;
@@ -86,6 +88,8 @@ class Kind:
     mistakes: Callable[[Any, Mapping[str, Array]], Iterator[Mistake]] = lambda rig, columns: iter(
         ()
     )
+    run: type[RunKeys] = RunKeys
+    besides: tuple[str, ...] = ()
     made_up: Callable[..., MadeUp] | None = None
     options: tuple[str, ...] = ()
     proposals: Callable[[Sequence[Measurement]], list[Proposal]] = lambda measurements: []

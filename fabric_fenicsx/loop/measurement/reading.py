@@ -17,12 +17,14 @@ from ...inputs.keys import plain
 from ...inputs.tables import read_table
 from ...inputs.validation import read_keys
 from .kind import Kind
-from .schema import FILE, SCHEMA, Measurement, MeasurementKeys, Run
+from .schema import FILE, SCHEMA, Measurement, MeasurementKeys, Run, RunKeys
 
 __all__ = ["measurement_models", "read_folder", "write_folder"]
 
 Array = npt.NDArray[np.float64]
 
+#: Keys of an entry of ``runs`` that every kind has.
+COMMON = RunKeys.model_fields
 #: Decimals of columns that are not compared.
 DECIMALS = {"time_s": 6, "displacement_mm": 6}
 
@@ -55,7 +57,9 @@ def read_folder(folder: Path, kinds: Sequence[Kind]) -> Measurement:
                     f"{folder / entry.file}: {column}: {columns[column][i]:g} in reading {i + 1}, "
                     f"allowed is {allowed}"
                 )
-        runs.append(Run(entry.file, entry.role == "holdout", entry.label, columns, entry.specimen))
+        own = {name: getattr(entry, name) for name in kind.run.model_fields if name not in COMMON}
+        holdout = entry.role == "holdout"
+        runs.append(Run(entry.file, holdout, entry.label, columns, entry.specimen, own))
     noise = getattr(keys.noise, kind.quantity)
     return Measurement(folder, kind.name, keys.title, keys.fabric, keys.rig, noise, tuple(runs))
 
@@ -67,12 +71,15 @@ def measurement_models(kinds: Sequence[Kind]) -> dict[str, type[MeasurementKeys]
         kind.quantity: (Positive | None, Field(None, description=f"of the {kind.label}"))
         for kind in kinds
     }
+    for name in (name for kind in kinds for name in kind.besides):
+        sigmas[name] = (Positive | None, Field(None, description=f"of {name}"))
     noise = create_model("NoiseKeys", __base__=Keys, __doc__="One sigma of a reading.", **sigmas)
     models = {}
     for kind in kinds:
         own: dict[str, Any] = {
             "test": (Literal[kind.name], Field(description="which test")),
             "rig": (kind.rig, Field(description="the rig")),
+            "runs": (list[kind.run], Field(min_length=1, description="the readings")),  # type: ignore[name-defined]
             "noise": (noise, Field(default_factory=noise, description="one sigma of a reading")),
         }
         models[kind.name] = create_model(f"{kind.name} keys", __base__=MeasurementKeys, **own)
@@ -82,7 +89,7 @@ def measurement_models(kinds: Sequence[Kind]) -> dict[str, type[MeasurementKeys]
 def _problem(keys: Any, kind: Kind) -> str | None:
     """What is wrong with keys that are right one by one: the key, and what is allowed."""
     given = [name for name, value in keys.noise if value is not None]
-    if given and kind.quantity not in given:
+    if given and not {kind.quantity, *kind.besides} & set(given):
         return (
             f"noise.{given[0]}: of another test, allowed is {kind.quantity} with test: {kind.name}"
         )

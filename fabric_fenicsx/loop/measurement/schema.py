@@ -6,7 +6,8 @@ of keys and columns. What only one kind of measurement has is in that kind's fol
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -96,6 +97,7 @@ class Run:
     label: str
     columns: dict[str, Array]
     specimen: str = ""
+    own: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ....rigs.picture_frame import PictureFrameCase, crosshead, duration
+from ....rigs.crosshead import crosshead, duration
+from ....rigs.picture_frame import PictureFrameCase
 from ...inference.effects import Effect
 from ...measurement.kind import MadeUp
 from ...measurement.schema import Measurement, Run, fabric_keys

@@ -11,28 +11,21 @@ classes that the whole net takes; how far tows that bend between crossings leave
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import cached_property, partial
-from math import inf, pi, sqrt
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from math import pi, sqrt
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import nnls
 from ufl import acos, sin
 
-from ....inputs.parameters import Parameter
-from ....mechanics.laws.dashpots import LinearDashpot
-from ....mechanics.laws.law import Crossing
-from ....mechanics.laws.springs import PolynomialSpring
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, Variant, of_run, scaled
-from ...inference.experiment import NO_DEVIATIONS, Deviations, OneCurve, deviated
-from ...inference.noise import estimated_noise
-from ...measurement.readings import common_noise, readings_of
-from ...measurement.schema import Measurement
+from ...inference.effects import Effect, Variant
+from ...inference.experiment import OneCurve
+from ...measurement.schema import Measurement, Run
+from ..crosshead import CrossheadTest, of_a_crossing, shifted
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
 from .terms import terms
@@ -41,86 +34,32 @@ from .variant import FrameVariant
 __all__ = ["PictureFrame"]
 
 Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
-BASELINE = (
-    Parameter("k1_N", (0.0,), 0.0, meaning="spring, moment per area and angle"),
-    Parameter("k3_N", (0.0,), 0.0, meaning="spring, moment per area and angle³"),
-    Parameter("c1_N_s", (0.0,), 0.0, meaning="dashpot, moment per area and rate"),
-)
-
-
-#: Time step [s] to the first point of a record.
-BEFORE = 1e-9
 #: Share by which speeds may differ that are one.
 SAME_RATE = 0.1
 
 
-class PictureFrame:
-    """Picture frames of one fabric.
-
-    Args:
-        measurements: folders of this test; they share the parameters of the fabric.
-        own: effects of the user's.
-        like: other frames, whose compiled expressions serve these too.
-    """
+class PictureFrame(CrossheadTest):
+    """Picture frames of one fabric; see CrossheadTest."""
 
     test = "picture_frame"
-    quantity = "force_N"
-    notes = ()
+    listed = PICTURE_FRAME_EFFECTS
 
-    def __init__(
-        self,
-        measurements: Sequence[Measurement],
-        own: Sequence[Effect] = (),
-        like: PictureFrame | None = None,
-    ) -> None:
-        self.noise = common_noise(measurements)
-        self.baseline: tuple[Parameter, ...] = BASELINE
-        runs = [(m, run) for m in measurements for run in m.runs]
-        motions = [
-            frame_motion(
-                run.columns["time_s"], run.columns["displacement_mm"], m.rig.frame_length_mm
-            )
-            for m, run in runs
-        ]
-        self._lay_out(motions)
+    def _motion(self, measurement: Measurement, run: Run) -> Motion:
+        """Driven at a constant speed or a constant rate of shear."""
+        return frame_motion(
+            run.columns["time_s"],
+            run.columns["displacement_mm"],
+            measurement.rig.frame_length_mm,
+        )
+
+    def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
         # Angles and rates of a frame that follows the crosshead; see _kinematics.
         self._still: dict[str, Varying] | None = None
         self._rig = {
             "frame": Varying(np.array([[m.rig.frame_length_mm for m, _ in runs]])),
             "fabric": Varying(np.array([[m.rig.fabric_length_mm for m, _ in runs]])),
         }
-        self._compiled: dict[Any, Marched] = {} if like is None else like._compiled
-        kinematics = self._kinematics(self._travel(None, {}), {})
-        gamma, rate = (self._at_readings(kinematics[key].value) for key in ("gamma", "rate"))
-        time = self._at_readings(self._points["time"].value)
-        self.readings = readings_of(
-            measurements,
-            np.concatenate([run.columns["force_N"] for _, run in runs]),
-            {
-                "shear angle [°]": np.degrees(gamma),
-                "shear rate [°/s]": np.degrees(rate),
-                "time [s]": time,
-            },
-            usable=np.concatenate([p.certain for p in motions]),
-        )
-        rate_error = np.concatenate([p.rate_error for p in motions])
-        self._leave_out_uncertain(
-            rate_error * self._at_readings(kinematics["rate_per_speed"].value)
-        )
-        self._start()
-        shares = {
-            "duration": max(float(p.time[-1] - p.time[0]) for p in motions),
-            "angle": float(np.abs(gamma).max()),
-            "rate": float(np.abs(rate).max()),
-            # Not read yet where a run is to be made up.
-            "force": float(np.abs(self.readings.observed).max()) or inf,
-            "typical_rate": _typical(np.abs(rate)),
-            "travel": float(np.abs(self._points["D"].value).max()),
-        }
-        self._gamma, self._rate = gamma, rate
-        self.effects = [self._with_runs(scaled(e, shares)) for e in (*PICTURE_FRAME_EFFECTS, *own)]
 
     @cached_property
     def terms(self) -> list[Effect]:
@@ -131,7 +70,7 @@ class PictureFrame:
             return float(np.abs(self._at_readings(values)[rows]).max())
 
         D, speed, time = (self._points[name] for name in ("D", "D_rate", "time"))
-        change = np.diff(self._kinematics(self._travel(None, {}), {})["gamma"].value, axis=0)
+        change = np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0)
         path = np.concatenate([np.zeros_like(D.value[:1]), np.cumsum(np.abs(change), axis=0)])
         force = self.readings.observed[rows]
         ranges = {
@@ -147,68 +86,6 @@ class PictureFrame:
         }
         return terms(ranges)
 
-    def _start(self) -> None:
-        """Begin fits of the baseline with its least squares, which are linear."""
-        rows = self.readings.fit
-        if rows.sum() <= len(self.baseline):
-            return
-        _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
-        J = np.column_stack([slopes[p.name][rows] for p in self.baseline])
-        scale = np.linalg.norm(J, axis=0)
-        scale[scale == 0.0] = 1.0
-        k = nnls(J / scale, self.readings.observed[rows])[0] / scale
-        self.baseline = tuple(
-            replace(p, starts=(float(value),)) for p, value in zip(self.baseline, k, strict=True)
-        )
-
-    def _leave_out_uncertain(self, rate_error: Array) -> None:
-        """Leave out readings whose rate is so uncertain [rad/s] that the dashpot's force is.
-
-        By more than a reading scatters, with the dashpot of a first fit, which also says how much
-        that is where it is not given; never more than half.
-        """
-        rows = self.readings.fit
-        _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
-        J = np.column_stack([slopes[p.name] for p in self.baseline])
-        if rows.sum() <= len(self.baseline):
-            return
-        k = np.linalg.lstsq(J[rows], self.readings.observed[rows], rcond=None)[0]
-        residual = self.readings.observed - J @ k
-        noise = self.noise or estimated_noise(residual, self.readings, rows)
-        factor = self._at_readings(self._kinematics(self._travel(None, {}), {})["factor"].value)
-        # Where nothing is known of the rate the motion has left the reading out itself.
-        rate_error = np.where(np.isfinite(rate_error), rate_error, 0.0)
-        clear = ~(np.abs(k[-1] * factor * rate_error) >= noise)
-        if (rows & clear).sum() > rows.sum() / 2:
-            self.readings = replace(self.readings, usable=self.readings.usable & clear)
-
-    def _lay_out(self, motions: Sequence[Motion]) -> None:
-        """Records side by side; the shorter ones rest at their last point."""
-        longest = max(len(p.time) for p in motions)
-        shape = (longest, len(motions))
-        time, D, rate = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-        places = []
-        for r, p in enumerate(motions):
-            count = len(p.time)
-            time[:count, r], D[:count, r], rate[:count, r] = p.time, p.displacement, p.rate
-            time[count:, r] = p.time[-1] + np.arange(1, longest - count + 1)
-            D[count:, r] = p.displacement[-1]
-            rows = np.flatnonzero(p.reading >= 0)
-            places.append((rows[np.argsort(p.reading[rows])], np.full(len(p.certain), r)))
-        self._place = tuple(np.concatenate(part) for part in zip(*places, strict=True))
-        step = np.diff(time, axis=0, prepend=time[:1])
-        # Nothing has happened before the first point.
-        step[0] = BEFORE
-        self._points = {
-            "time": Varying(time),
-            "D": Varying(D),
-            "D_rate": Varying(rate),
-            "per_time": Varying(1.0 / step),
-        }
-
-    def _at_readings(self, values: Array) -> Array:
-        return np.broadcast_to(values, self._points["D"].value.shape)[self._place]
-
     @property
     def one_curve(self) -> OneCurve | None:
         """The moment against the angle, where all runs that are fitted go one way at one rate.
@@ -216,7 +93,7 @@ class PictureFrame:
         At one speed of the crosshead or of the angle: the rate is then a function of the angle.
         """
         rows = self.readings.fit
-        known = self._kinematics(self._travel(None, {}), {})
+        known = self._kinematics(self._points, {})
         rate = self._at_readings(known["rate"].value)[rows]
         speed = self._at_readings(self._points["D_rate"].value)[rows]
         steady = any(
@@ -226,9 +103,6 @@ class PictureFrame:
             return None
         every = self._at_readings(known["gamma"].value), self._at_readings(known["factor"].value)
         return OneCurve("shear_angle_rad", "moment_N", *every)
-
-    def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
-        """None: the moment depends on the angle, its rate and its past; see Experiment."""
 
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """What a term without a formula depends on, at every reading; see Experiment."""
@@ -241,155 +115,12 @@ class PictureFrame:
             names = tuple(p.name for p in variant.parameters) + variant.of_baseline
             marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
             law = variant.laws(marched.at)[0]
-            crossing = _crossing(marched, 0)
+            crossing = of_a_crossing(marched, 0)
             history = {f"0 {n}": value for n, value in law.history(crossing).items()}
             variable = law.variable_at(crossing)
             self._compiled[key] = marched.define({"variable": variable}, history)
         found = self._compiled[key](self._kinematics(self._points, {}), values)["variable"]
         return self._at_readings(found.value)
-
-    def predict(
-        self,
-        variants: Sequence[Variant],
-        values: Mapping[str, float],
-        deviations: Deviations = NO_DEVIATIONS,
-    ) -> tuple[Array, dict[str, Array]]:
-        """Crosshead forces [N] and their derivatives; see Experiment.
-
-        Forces are linear in the baseline's parameters and in most amplitudes: what specimens
-        deviate by is taken to first order.
-        """
-        force, slopes = self._common(variants, values)
-        # The first predictions are made before the readings are put together.
-        if not deviations:
-            return force, slopes
-        return deviated(force, slopes, values, deviations, self.readings.specimen)
-
-    def _common(
-        self, variants: Sequence[Variant], values: Mapping[str, float]
-    ) -> tuple[Array, dict[str, Array]]:
-        """The same with specimens that are alike."""
-        mine = [v for v in variants if isinstance(v, FrameVariant)]
-        travels = [v for v in mine if v.travel is not None]
-        travel = self._travel(travels[0] if travels else None, values)
-        whole = self._force(travel, mine, values)
-        for v in mine:
-            if v.added_travel is not None:
-                # The force with the travel as it would be without: what is added is little.
-                ahead = self._added(v, "travel", whole, values)
-                travel = self._moved(travel, ahead)
-                whole = self._force(travel, mine, values)
-        force, slopes = whole.value, dict(whole.slopes)
-        zeros: list[tuple[Flags, Array]] = []
-        for v in mine:
-            if v.added_reading is not None:
-                added = self._added(v, "reading", whole, values)
-                force = force + added.value
-                for p, slope in added.slopes.items():
-                    slopes[p] = slopes.get(p, 0.0) + slope
-            if v.reading is not None:
-                if v.each_run:
-                    added, own_zeros = self._each_run(v, values, force)
-                    zeros += own_zeros
-                else:
-                    added = self._reading(v, values)
-                force = force + added.value
-                for p, slope in added.slopes.items():
-                    slopes[p] = slopes.get(p, 0.0) + slope
-        names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
-        zero = np.zeros(len(self._place[0]))
-        found = {
-            name: self._at_readings(slopes[name]) if name in slopes else zero for name in names
-        }
-        for rows, J in zeros:
-            # What a zero taken from the readings makes up for.
-            for name, slope in found.items():
-                found[name] = slope.copy()
-                found[name][rows] -= J @ np.linalg.lstsq(J, slope[rows], rcond=None)[0]
-        return self._at_readings(force), found
-
-    def _travel(self, variant: FrameVariant | None, values: Mapping[str, float]) -> Any:
-        """True displacement of the frame, and its rate."""
-        if variant is None or variant.travel is None:
-            return self._points
-        key = (variant, "travel")
-        if key not in self._compiled:
-            marched = Marched(("D", "D_rate"), tuple(p.name for p in variant.parameters))
-            past = marched.remembered("D") if variant.remembers_travel else None
-            true = variant.travel(marched.at, marched.at["D"], past)
-            rate = derivative_of(true, marched.at["D"]) * marched.at["D_rate"]
-            history = {"D": true} if variant.remembers_travel else {}
-            self._compiled[key] = marched.define({"D": true, "D_rate": rate}, history)
-        return self._compiled[key](self._points, values)
-
-    def _force(
-        self, travel: Any, variants: Sequence[FrameVariant], values: Mapping[str, float]
-    ) -> Varying:
-        """Force of the frame at its own displacement [N]."""
-        known = self._kinematics(travel, values)
-        moments = [self._moment(None, known, values)]
-        moments += [self._moment(v, known, values) for v in variants if v.laws is not None]
-        factor = known["factor"]
-        slopes: dict[str, Any] = {}
-        for m in moments:
-            for p, slope in m.slopes.items():
-                slopes[p] = slopes.get(p, 0.0) + slope * factor.value
-            for p, slope in factor.slopes.items():
-                slopes[p] = slopes.get(p, 0.0) + m.value * slope
-        return Varying(sum(m.value for m in moments) * factor.value, slopes)
-
-    def _added(
-        self, variant: FrameVariant, to: str, force: Varying, values: Mapping[str, float]
-    ) -> Varying:
-        """What a form adds to the reading [N] or to the travel [mm]."""
-        key = (variant, to)
-        if key not in self._compiled:
-            expression = variant.added_reading if to == "reading" else variant.added_travel
-            assert expression is not None
-            marched = Marched(variant.of, tuple(p.name for p in variant.parameters))
-            self._compiled[key] = marched.define({"added": expression(marched.at, marched.at)}, {})
-        marched, known = self._compiled[key], self._known(force)
-        return marched({name: known[name]() for name in marched.inputs}, values)["added"]
-
-    def _known(self, force: Varying) -> dict[str, Callable[[], Varying]]:
-        """What is known at a reading, by the names of FrameVariant.of, where it is wanted."""
-        return {
-            "time": self._since_start,
-            "displacement": lambda: self._points["D"],
-            "speed": lambda: self._points["D_rate"],
-            "acceleration": lambda: self._per_second(self._points["D_rate"]),
-            "force": lambda: force,
-            "force_rate": lambda: self._per_second(force),
-        }
-
-    def _since_start(self) -> Varying:
-        """Time in each run [s]."""
-        time = self._points["time"].value
-        return Varying(time - time[0])
-
-    def _per_second(self, x: Varying) -> Varying:
-        """How fast something changes along each record."""
-        time = self._points["time"].value
-
-        def rate(values: Array) -> Array:
-            values = np.broadcast_to(values, time.shape)
-            return np.stack([np.gradient(v, t) for v, t in zip(values.T, time.T, strict=True)], 1)
-
-        return Varying(rate(x.value), {p: rate(slope) for p, slope in x.slopes.items()})
-
-    def _moved(self, travel: Any, ahead: Varying) -> dict[str, Varying]:
-        """A travel with what is added to it, and its rate."""
-
-        def total(a: Varying, b: Varying) -> Varying:
-            slopes: dict[str, Any] = dict(a.slopes)
-            for p, slope in b.slopes.items():
-                slopes[p] = slopes.get(p, 0.0) + slope
-            return Varying(a.value + b.value, slopes)
-
-        return {
-            "D": total(travel["D"], ahead),
-            "D_rate": total(travel["D_rate"], self._per_second(ahead)),
-        }
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         """γ at each point and at the one before, γ̇, and force per moment."""
@@ -411,133 +142,8 @@ class PictureFrame:
         rig = {name: Varying(np.broadcast_to(v.value, shape)) for name, v in self._rig.items()}
         known = dict(self._compiled["kinematics"]({**travel, **rig}, values))
         gamma = known["gamma"]
-        before = Varying(_shifted(gamma.value), {p: _shifted(s) for p, s in gamma.slopes.items()})
+        before = Varying(shifted(gamma.value), {p: shifted(s) for p, s in gamma.slopes.items()})
         known |= {"gamma_n": before, "per_time": self._points["per_time"]}
         if travel is self._points:
             self._still = known
         return known
-
-    def _moment(
-        self, variant: FrameVariant | None, known: dict[str, Varying], values: Mapping[str, float]
-    ) -> Varying:
-        """Moment per area [N] of the baseline or of an effect."""
-        key = (variant, "moment")
-        if key not in self._compiled:
-            parameters = self.baseline if variant is None else variant.parameters
-            names = tuple(p.name for p in parameters)
-            names += () if variant is None else variant.of_baseline
-            marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
-            p = marched.at
-            if variant is None:
-                laws: tuple[Any, ...] = (
-                    PolynomialSpring(k1=p["k1_N"], k3=p["k3_N"]),
-                    LinearDashpot(p["c1_N_s"]),
-                )
-            else:
-                assert variant.laws is not None
-                laws = variant.laws(p)
-            moment: Any = 0.0
-            history: dict[str, Any] = {}
-            for k, law in enumerate(laws):
-                crossing = _crossing(marched, k)
-                moment = moment + law.moment(crossing)
-                history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
-            self._compiled[key] = marched.define({"moment": moment}, history)
-        return self._compiled[key](known, values)["moment"]
-
-    def _reading(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
-        key = (variant, "reading")
-        if key not in self._compiled:
-            assert variant.reading is not None
-            marched = Marched(("time",), tuple(p.name for p in variant.parameters))
-            added = variant.reading(marched.at, marched.at["time"])
-            self._compiled[key] = marched.define({"force": added}, {})
-        return self._compiled[key](self._points, values)["force"]
-
-    def _with_runs(self, effect: Effect) -> Effect:
-        """Parameters of their own for each run that is fitted, where a form wants them."""
-        runs = np.unique(self.readings.run[self.readings.fit])
-
-        def expanded(v: Variant) -> Variant:
-            if not (isinstance(v, FrameVariant) and v.each_run):
-                return v
-            own = tuple(of_run(p, int(run)) for run in runs for p in v.parameters)
-            return replace(v, parameters=own)
-
-        each = [v for v in effect.variants if getattr(v, "each_run", False)]
-        shared = [v for v in effect.variants if v not in each]
-        if len(self.readings.names) == 1:
-            each = []
-        elif each and len(runs) == 1:
-            # One fitted run cannot tell the two apart: nothing is claimed of the other runs.
-            shared = [v for v in shared if getattr(v, "reading", None) is None]
-        return replace(effect, variants=tuple(expanded(v) for v in (*shared, *each)))
-
-    def _each_run(
-        self, variant: FrameVariant, values: Mapping[str, float], force: Array
-    ) -> tuple[Varying, list[tuple[Flags, Array]]]:
-        """What the load cell adds; in a run that is not fitted, what fits best to what is left.
-
-        Also the readings of such runs, flags, and the columns that were fitted to them.
-        """
-        zeros = []
-        assert variant.reading is not None
-        names = dict.fromkeys(p.name.split("_", 1)[1] for p in variant.parameters)
-        # The form's, not the variant's, which may have parameters of fewer runs.
-        key = variant.reading
-        if key not in self._compiled:
-            unit = Marched(("time",), tuple(names))
-            added = variant.reading(unit.at, unit.at["time"])
-            self._compiled[key] = unit.define({"force": added}, {})
-        added = self._compiled[key](self._points, dict.fromkeys(names, 0.0))["force"]
-        columns = added.slopes
-        shape = self._points["time"].value.shape
-        total, found = np.zeros(shape), {}
-        left = self.readings.observed - self._at_readings(force)
-        for run in range(shape[1]):
-            rows = self.readings.run == run
-            own = {n: np.broadcast_to(c, shape)[:, run] for n, c in columns.items()}
-            if f"run{run + 1}_{next(iter(names))}" in values:
-                for n, column in own.items():
-                    name = f"run{run + 1}_{n}"
-                    total[:, run] += values[name] * column
-                    found[name] = np.zeros(shape)
-                    found[name][:, run] = column
-            else:
-                rows = rows & self.readings.usable
-                J = np.column_stack(
-                    [self._at_readings(np.broadcast_to(c, shape))[rows] for c in columns.values()]
-                )
-                zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
-                zeros.append((rows, J))
-                total[:, run] = sum(z * c for z, c in zip(zero, own.values(), strict=True))
-        return Varying(total, found), zeros
-
-
-def _typical(rate: Array) -> float:
-    """Median of the rates [rad/s] while the frame moves."""
-    moving = rate[rate > 1e-6 * float(rate.max())]
-    return float(np.median(moving)) if len(moving) else 1.0
-
-
-def _crossing(marched: Marched, number: int) -> Crossing:
-    """What one of several laws may use, in symbols."""
-    at = marched.at
-    return Crossing(
-        at["gamma"],
-        at["gamma_n"],
-        at["per_time"],
-        lambda value: value,
-        partial(_remembered, marched, number),
-        at["rate"],
-    )
-
-
-def _remembered(marched: Marched, number: int, name: str) -> Any:
-    """A memory of one of several laws, which may use the same names."""
-    return marched.remembered(f"{number} {name}")
-
-
-def _shifted(values: Array) -> Array:
-    """At the point before; at the first point the value there."""
-    return np.concatenate([values[:1], values[:-1]])

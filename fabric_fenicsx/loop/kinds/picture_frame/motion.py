@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
-__all__ = ["Motion", "frame_motion", "motion"]
+__all__ = ["Motion", "crosshead_motion", "frame_motion", "motion"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -82,6 +82,16 @@ def frame_motion(time: Array, displacement: Array, frame_length: float) -> Motio
         rate=lever * angle.rate,
         rate_error=frame_length * np.sin(np.pi / 4 - gamma / 2) * angle.rate_error,
     )
+
+
+def crosshead_motion(time: Array, displacement: Array) -> Motion:
+    """The motion of a crosshead, driven at constant speeds.
+
+    Args:
+        time: of the readings [s], increasing, (n,).
+        displacement: [mm], (n,).
+    """
+    return _best_known(time, displacement, _resolution(displacement))
 
 
 def _best_known(time: Array, values: Array, resolution: float) -> Motion:

@@ -1,0 +1,119 @@
+"""Effects that a bias extension shows: laws of a crossing, slip, and what acts on travel, reading.
+
+Along one way out at one speed the laws of a crossing are all a curve m(γ): they are each other's
+rivals until a strip is pulled at another speed, held or unloaded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ....inputs.parameters import Parameter
+from ....mechanics.laws import LAWS
+from ...inference.effects import Effect, Values
+from ..picture_frame.effects import OF_THE_LAW, PICTURE_FRAME_EFFECTS
+from ..picture_frame.variant import FrameVariant, law_effects
+
+__all__ = ["BIAS_EXTENSION_EFFECTS", "StripPullVariant"]
+
+#: Not of a strip: its tows run from no clamp to another.
+OF_A_FRAME = ("tension_coupling",)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StripPullVariant(FrameVariant):
+    """A form that changes how a strip moves, beside what a form in a picture frame may have.
+
+    Attributes:
+        changes: keys of the case (rigs.bias_extension.BiasExtensionCase) by their dotted names, of
+            the value of the first parameter, an amplitude; not asked for at zero, the baseline.
+        solved_at: values of that amplitude at which the strip is solved when it is needed, zero
+            apart; in between it is interpolated. In the unit of its starts and bounds.
+    """
+
+    changes: Callable[[float], Mapping[str, Any]] | None = None
+    solved_at: tuple[float, ...] = ()
+
+
+SLIP = Parameter(
+    "slip_1_N",
+    (1.0, 5.0),
+    0.0,
+    40.0,
+    amplitude=True,
+    meaning="one over the in-plane force at which tows slip at a crossing",
+    share_of="per_tow_force",
+)
+CRIMP = Parameter(
+    "crimp_strain",
+    (0.01, 0.03),
+    0.0,
+    0.06,
+    amplitude=True,
+    meaning="by which tows lengthen as their crimp is drawn out",
+)
+DRAWN = Parameter(
+    "drawn_out",
+    (0.02, 0.1),
+    0.0,
+    0.5,
+    amplitude=True,
+    meaning="share of the travel that draws out of the clamps",
+)
+
+
+def _share(p: Values, D: Any, past: Any) -> Any:
+    return D * (1 - p["drawn_out"])
+
+
+def _bias_law_effects() -> tuple[Effect, ...]:
+    meanings = {name: text for name, text in OF_THE_LAW.items() if name not in OF_A_FRAME}
+    found = law_effects(LAWS.values(), meanings)
+    return tuple(replace(e, test="bias_extension") for e in found if e.name in meanings)
+
+
+(_DRIFT,) = (e for e in PICTURE_FRAME_EFFECTS if e.name == "load_drift")
+
+BIAS_EXTENSION_EFFECTS = (
+    *_bias_law_effects(),
+    Effect(
+        "crossover_slip",
+        "bias_extension",
+        "tows move past each other at a crossing beyond a limit",
+        (
+            StripPullVariant(
+                "at a force",
+                (SLIP,),
+                changes=lambda per_force: {
+                    "crossover.slip_limit_N": 1.0 / per_force,
+                    # Of no weight beside the slip, in half the iterations.
+                    "crossover.translation_N_mm": 10.0,
+                },
+                solved_at=(2.5, 10.0, 40.0),
+            ),
+        ),
+    ),
+    Effect(
+        "tow_uncrimping",
+        "bias_extension",
+        "crimped tows stretch softly until the crimp is out",
+        (
+            StripPullVariant(
+                "soft, then stiff",
+                (CRIMP,),
+                changes=lambda strain: {"tow.crimp_strain": strain},
+                solved_at=(0.01, 0.03, 0.06),
+            ),
+        ),
+    ),
+    Effect(
+        "clamp_slip",
+        "bias_extension",
+        "the strip draws out of its clamps",
+        (FrameVariant("share of the travel", (DRAWN,), travel=_share),),
+        of_fabric=False,
+    ),
+    replace(_DRIFT, test="bias_extension"),
+)

@@ -1,0 +1,196 @@
+"""A strip pulled out once by the finite elements: what its crossings did on the way.
+
+A law of the crossings without memory is known by its curve m(γ); any other goes through one such
+curve on the way out. The strip is solved with that curve, as a table, so that nothing is compiled
+for another law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from mpi4py import MPI
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import ValidationError
+from scipy.interpolate import PchipInterpolator
+
+from ....errors import InputError
+from ....mechanics.laws.tabulated import TabulatedSpring
+from ....rigs.bias_extension import BiasExtensionCase, build, clamps, middle_zone
+from ....rigs.common import Session, control
+from ....rigs.crosshead import duration
+from ....solving.stepping import Step, Stepper
+from ...measurement.schema import FILE, Measurement, Run
+
+__all__ = ["KNOTS", "Curve", "StripPath", "solved_strip", "strip_case"]
+
+Array = npt.NDArray[np.float64]
+
+#: Angles [degrees] at which a curve is given; the last piece goes on straight.
+KNOTS = np.array([0.0, 3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 38.0, 44.0, 50.0, 56.0, 62.0, 70.0])
+#: Steps of a way out, if none fails.
+STEPS = 28
+#: Least slope of a curve over the largest moment: nothing else holds crossings that do nothing.
+LEAST_SLOPE = 1e-3
+#: E I of a tow in the sheet's plane per width [N mm] where a measurement does not give it.
+IN_PLANE = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A moment per area m(γ) [N/mm] at KNOTS, monotone cubic in between, odd.
+
+    Attributes:
+        moments: at the knots, not falling, 0 at first.
+    """
+
+    moments: tuple[float, ...]
+
+    @classmethod
+    def through(cls, moments: Array) -> Curve:
+        """The nearest that does not fall."""
+        rising = np.maximum.accumulate(np.maximum(moments, 0.0))
+        least = LEAST_SLOPE * max(float(rising[-1]), 1e-9) * np.radians(KNOTS)
+        return cls((0.0, *(rising + least)[1:].tolist()))
+
+    def __call__(self, gamma: Array) -> Array:
+        """At shear angles [rad]."""
+        cubics = PchipInterpolator(np.radians(KNOTS), self.moments)
+        last = np.radians(KNOTS[-1])
+        size = np.abs(gamma)
+        beyond = np.maximum(size - last, 0.0) * float(cubics.derivative()(last))
+        return np.asarray(np.sign(gamma) * (cubics(np.minimum(size, last)) + beyond))
+
+    def law(self, area: float) -> TabulatedSpring:
+        """Of a crossing that stands for an area [mm²]."""
+        return TabulatedSpring(
+            tuple(np.radians(KNOTS).tolist()), tuple(area * m for m in self.moments)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class StripPath:
+    """A strip on its way out.
+
+    Attributes:
+        travel: D [mm], increasing from 0, (n,).
+        force: of the crosshead [N], (n,).
+        gamma: shear angles that the crossings feel [rad], (n, n_crossings).
+        middle: mean angle between the tows' axes in the middle zone [rad], (n,).
+        area: of fabric that each crossing stands for [mm²], (n_crossings,).
+    """
+
+    travel: Array
+    force: Array
+    gamma: Array
+    middle: Array
+    area: Array
+
+
+def strip_case(
+    measurement: Measurement,
+    run: Run,
+    travel: float,
+    rate: float,
+    changes: Mapping[str, Any],
+) -> BiasExtensionCase:
+    """The case of a run's way out, its crossings without a moment of their own.
+
+    Args:
+        measurement: of bias extension.
+        run: of it.
+        travel: largest displacement [mm].
+        rate: of the crosshead [mm/s].
+        changes: other keys, by their dotted names.
+
+    Raises:
+        InputError: there can be no such strip.
+    """
+    fabric, length, width = measurement.fabric, run.own["length_mm"], run.own["width_mm"]
+    s, a, b = fabric.tow_spacing_mm, fabric.tow.width_mm, fabric.tow.height_mm
+    given = "bending_in_plane_Nmm" in fabric.tow.model_fields_set
+    duration = travel / rate
+    keys: dict[str, Any] = {
+        "test": "bias_extension",
+        "length_mm": length,
+        "width_mm": width,
+        "bias_deg": measurement.rig.bias_deg,
+        "warp_spacing_mm": s,
+        "weft_spacing_mm": s,
+        "travel_mm": travel,
+        "rate_mm_min": 60.0 * rate,
+        "hold_s": 0.0,
+        "unload": False,
+        "tow": {
+            "width_mm": a,
+            "height_mm": b,
+            "density_kg_mm3": 1e-6 * fabric.areal_density_kg_m2 * s / (2.0 * a * b),
+            "C1_MPa": fabric.tow.C1_MPa,
+            "stiffness": {
+                "bending_in_plane_Nmm": fabric.tow.bending_in_plane_Nmm if given else IN_PLANE
+            },
+        },
+        "crossover": {"k1_N_mm": 0.0, "k3_N_mm": 0.0, "dashpot_N_s_mm": 0.0},
+        "solver": {
+            "first_step_s": duration / STEPS,
+            "largest_step_s": duration / STEPS,
+            "smallest_step_s": 1e-4 * duration / STEPS,
+        },
+    }
+    for dotted, value in changes.items():
+        *groups, name = dotted.split(".")
+        place = keys
+        for group in groups:
+            place = place.setdefault(group, {})
+        place[name] = value
+    try:
+        return BiasExtensionCase.model_validate(keys)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = "".join(f"{part}: " for part in first["loc"])
+        said = f"{key}{first['msg'].removeprefix('Value error, ')}"
+        raise InputError(f"{measurement.folder / FILE}: {run.file}: {said}") from error
+
+
+def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:
+    """Pull a strip on this rank alone.
+
+    Raises:
+        InputError: there is no such strip.
+        SolveError: it stopped before its end.
+    """
+    session = Session(Path(), MPI.COMM_SELF, Path(), perf_counter(), laws=(curve.law,))
+    try:
+        model = build(case, session)
+    except ValueError as error:
+        raise InputError(f"bias_extension: {error}") from None
+    net = model.net
+    places, spacings = net.points[net.crossings[:, 0]], case.spacings
+    upper = clamps(net, case)[1]
+    middle = middle_zone(net, case)[0]
+    travels, forces, means, angles = [0.0], [0.0], [0.0], [np.zeros(len(places))]
+
+    def observe(step: Step) -> None:
+        travels.append(case.rate_mm_min / 60.0 * step.time)
+        forces.append(float(model.reactions()[upper, 1].sum()))
+        snapshot = model.snapshot(step.time)
+        # What the springs feel is the directors' turn, what a camera sees the axes' angle.
+        angles.append(snapshot.director_turn)
+        means.append(float(snapshot.shear_angle[middle].mean()))
+
+    solver = case.solver
+    newton = model.newton(force_tolerance=solver.force_tolerance_N, limit=solver.iteration_limit)
+    Stepper(model, newton, control(solver), observe=observe).run(duration(case))
+    return StripPath(
+        np.array(travels),
+        np.array(forces),
+        np.array(angles),
+        np.array(means),
+        case.strip.shares(places, spacings) * spacings[0] * spacings[1],
+    )

@@ -1,0 +1,274 @@
+"""Bias extension: a strip cut at an angle to its tows, clamped at both ends, is pulled.
+
+The strip lies about the origin with its pull along y; see fabric.bias_strip for its tows, its
+zones and what constant shear in each of them would do. The net finds its own state: the clamps
+hold places and turns of the tows' ends in them, all else is free.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, field_validator, model_validator
+
+from ..errors import InputError
+from ..fabric.bias_strip import BiasStrip
+from ..fabric.layout import SHORTEST_END
+from ..fabric.net import Net
+from ..fabric.paths import TowPaths
+from ..inputs.groups import NotNegative, Positive
+from .cases import StiffnessKeys, TowKeys
+from .crosshead import CrossheadCase, crosshead, duration, turns
+from .rig import Compared, Rig
+
+if TYPE_CHECKING:
+    from ..solving.model import Model
+    from ..solving.snapshot import Snapshot
+    from .common import Session
+
+__all__ = ["RIG", "BiasExtensionCase", "build", "clamps", "middle_zone", "run", "waist"]
+
+Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+COLUMNS = (
+    "time_s",
+    "displacement_mm",
+    "force_N",
+    "shear_angle_deg",
+    "centre_angle_deg",
+    "waist_mm",
+    "largest_slip_mm",
+    "mean_slip_mm",
+    "edge_slip_mm",
+)
+"""Of curve.csv. Angles are those between the tows' axes, from places of neighbouring crossings: the
+mean over zone A, all crossings whose two tows end in no clamp, and over the same zone at half its
+length and width. Slip is how far the two tows of a crossing have parted, its springs' stretch
+included: the largest, the mean, and the mean on the free edges, without crossings in the clamps."""
+
+
+class StripStiffnessKeys(StiffnessKeys):
+    """As elsewhere, but tows bend easily in the sheet's plane, as bundles of loose fibres do."""
+
+    bending_in_plane_Nmm: Positive | None = Field(0.1, description="E I in the sheet's plane")
+
+
+class StripTowKeys(TowKeys):
+    """As elsewhere, but for the stiffness."""
+
+    stiffness: StripStiffnessKeys = Field(
+        default_factory=StripStiffnessKeys,
+        description="in place of what follows from the section; null: all as it follows",
+    )
+
+    @field_validator("stiffness", mode="before")
+    @classmethod
+    def _all_of_the_section(cls, stiffness: Any) -> Any:
+        return {"bending_in_plane_Nmm": None} if stiffness is None else stiffness
+
+
+class BiasExtensionCase(CrossheadCase):
+    """A strip cut at an angle to its tows is pulled between two clamps."""
+
+    test: Literal["bias_extension"]
+    length_mm: Positive = Field(200.0, description="L, free length between the clamps")
+    width_mm: Positive = Field(100.0, description="W")
+    bias_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = Field(
+        45.0, description="β, angle of the warp from the pull, to the left; the weft is at 90 - β"
+    )
+    warp_spacing_mm: Positive = Field(
+        5.2,
+        description="distance between warp tows; at 45 degrees and equal spacings the nearest is "
+        "taken with which the free edges pass through crossings",
+    )
+    weft_spacing_mm: Positive = Field(5.2, description="distance between weft tows, likewise")
+    subdivisions: Annotated[int, Field(ge=1, le=64)] = Field(
+        1,
+        description="cells of a tow between two crossings; with more than one, tows that bend "
+        "easily in the sheet's plane evade the crossings' springs by winding between them",
+    )
+    travel_mm: Positive = Field(30.0, description="of the crosshead")
+    hold_s: NotNegative = Field(0.0, description="time at rest before the way back")
+    unload: bool = Field(False, description="move back to where it began")
+    gravity_mm_s2: NotNegative = Field(
+        0.0, description="along the strip, away from the crosshead; 9810 for one that hangs"
+    )
+    tow: StripTowKeys = Field(default_factory=StripTowKeys, description="the virtual tows")
+
+    @model_validator(mode="after")
+    def _has_a_middle(self) -> BiasExtensionCase:
+        a, b = self.warp_spacing_mm, self.weft_spacing_mm
+        cosine, sine = np.cos(np.radians(self.bias_deg)), np.sin(np.radians(self.bias_deg))
+        least = max((a + self.width_mm * cosine) / sine, (b + self.width_mm * sine) / cosine)
+        if self.length_mm < least:
+            raise ValueError(
+                f"length_mm: at least {least:.5g}, so that two tows of each family end in no clamp"
+            )
+        return self
+
+    @property
+    def spacings(self) -> tuple[float, float]:
+        """Distance between warp and between weft tows as they lie [mm]."""
+        return self.strip.fitted(self.warp_spacing_mm, self.weft_spacing_mm)
+
+    @property
+    def strip(self) -> BiasStrip:
+        """The strip."""
+        return BiasStrip(self.length_mm, self.width_mm, self.bias_deg)
+
+
+def fabrics(case: BiasExtensionCase, base: Path) -> dict[str, TowPaths]:
+    """The one strip."""
+    return {"strip": case.strip.layout(case.spacings, case.subdivisions)}
+
+
+def clamps(net: Net, case: BiasExtensionCase) -> tuple[Integers, Integers]:
+    """Nodes in the lower and in the upper clamp line, where the tows are cut.
+
+    Raises:
+        InputError: a mesh of the user's own has none there.
+    """
+    short = SHORTEST_END * max(case.spacings) / case.subdivisions
+    inner = case.length_mm / 2.0 - short
+    lower, upper = (np.flatnonzero(side * net.points[:, 1] >= inner) for side in (-1.0, 1.0))
+    if not (len(lower) and len(upper)):
+        raise InputError(
+            f"mesh: no node in a clamp, allowed is one with tows to y = -{case.length_mm / 2.0:g} "
+            f"and {case.length_mm / 2.0:g}"
+        )
+    return lower, upper
+
+
+def build(case: BiasExtensionCase, session: Session) -> Model:
+    """The model of a strip. Collective."""
+    from ..solving.model import Support
+    from .common import fabric_model, tow_net
+
+    net = tow_net(case, fabrics(case, session.base)["strip"], session)
+    lower, upper = clamps(net, case)
+    every = (0, 1, 2, 3, 4, 5)
+
+    def pulled(time: float) -> Array:
+        return np.tile([0.0, crosshead(case, time), 0.0], (len(upper), 1))
+
+    shares = case.strip.shares(net.points[net.crossings[:, 0]], case.spacings)
+    return fabric_model(
+        case,
+        net,
+        case.spacings,
+        session,
+        viscosity=case.tow.relaxation_time_s,
+        gravity=(0.0, -case.gravity_mm_s2, 0.0),
+        supports=[Support(lower, every), Support(upper, every, pulled)],
+        interlacing=shares,
+        patch=shares,
+    )
+
+
+def middle_zone(net: Net, case: BiasExtensionCase) -> tuple[Integers, Integers]:
+    """Crossings whose two tows end in no clamp, zone A, and those of A at half its size.
+
+    Raises:
+        InputError: a mesh of the user's own has none.
+    """
+    places = net.points[net.crossings[:, 0]]
+    zone, centre = (
+        np.flatnonzero(case.strip.gripped(factor * places) == 0) for factor in (1.0, 2.0)
+    )
+    if not len(centre):
+        raise InputError(
+            "mesh: no crossing about the origin, allowed is one with tows that end in no clamp"
+        )
+    return zone, centre
+
+
+def waist(net: Net, case: BiasExtensionCase, displacement: Array) -> float:
+    """Smallest width of the strip [mm], between lines through the tows' ends on its edges."""
+    reach = case.width_mm / 2.0 - SHORTEST_END * max(case.spacings) / case.subdivisions
+    places = net.points + displacement
+    sides = []
+    for sign in (-1.0, 1.0):
+        edge = places[sign * net.points[:, 0] >= reach]
+        sides.append(edge[np.argsort(edge[:, 1])])
+    heights = np.concatenate([edge[:, 1] for edge in sides])
+    left, right = (np.interp(heights, edge[:, 1], edge[:, 0]) for edge in sides)
+    return float((right - left).min())
+
+
+def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
+    """Pull a strip and write its results. Collective.
+
+    Returns:
+        The content of result.json.
+    """
+    from .common import control, extend, simulated, write_table
+
+    model = build(case, session)
+    net = model.net
+    lower, upper = clamps(net, case)
+    middle, centre = middle_zone(net, case)
+    warp, weft = net.crossings.T
+    free = np.flatnonzero(~np.isin(warp, np.concatenate([lower, upper])))
+    edge = np.abs(net.points[warp, 0]) > case.width_mm / 2.0 - max(case.spacings) / 2.0
+    edge = np.intersect1d(free, np.flatnonzero(edge))
+
+    def measure(snapshot: Snapshot) -> dict[str, float]:
+        u = snapshot.displacement
+        slip = np.linalg.norm(u[weft] - u[warp], axis=1)
+        angle = np.degrees(snapshot.shear_angle)
+        return {
+            "displacement_mm": crosshead(case, snapshot.time),
+            "force_N": float(model.reactions()[upper, 1].sum()),
+            "shear_angle_deg": float(angle[middle].mean()),
+            "centre_angle_deg": float(angle[centre].mean()),
+            "waist_mm": waist(net, case, u),
+            "largest_slip_mm": float(slip[free].max()),
+            "mean_slip_mm": float(slip[free].mean()),
+            "edge_slip_mm": float(slip[edge].mean()) if len(edge) else 0.0,
+            "largest_out_of_plane_mm": float(np.abs(u[:, 2]).max()),
+        }
+
+    outcome = simulated(
+        case,
+        model,
+        session,
+        end=duration(case),
+        stops=turns(case),
+        control=control(case.solver),
+        measure=measure,
+    )
+    columns = {name: np.array([row[name] for row in outcome.rows]) for name in COLUMNS}
+    write_table(session, "curve.csv", columns)
+    quantities: dict[str, Any] = {}
+    if outcome.last is not None:
+        last = {name: float(values[-1]) for name, values in columns.items()}
+        quantities = {
+            "warp_spacing_mm": case.spacings[0],
+            "weft_spacing_mm": case.spacings[1],
+            "peak_force_N": float(columns["force_N"].max()),
+            "largest_shear_angle_deg": float(columns["shear_angle_deg"].max()),
+            "waist_mm": last["waist_mm"],
+            "largest_slip_mm": last["largest_slip_mm"],
+            "largest_out_of_plane_mm": max(r["largest_out_of_plane_mm"] for r in outcome.rows),
+        }
+        if session.root and session.pictures:
+            from ..output.bias_strip import draw_curve, draw_strip
+
+            folder = session.folder
+            draw_strip(folder / "bias_extension.png", net, outcome.last, case.strip)
+            draw_curve(folder / "curve.png", columns, case.strip)
+    return extend(outcome.summary, quantities, session)
+
+
+RIG = Rig(
+    case=BiasExtensionCase,
+    fabrics=fabrics,
+    run=run,
+    steps=lambda case: 1.1 * duration(case) / case.solver.largest_step_s,
+    iterations=2.5,
+    compared=Compared("curve.csv", ("force_N", "shear_angle_deg"), along="time_s"),
+)
