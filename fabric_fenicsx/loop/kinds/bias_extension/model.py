@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from ....errors import SolveError
+from ....errors import InputError, SolveError
 from ....fabric.bias_strip import BiasStrip
 from ...expressions.marching import Varying
 from ...inference.effects import Effect, Variant
@@ -420,9 +420,18 @@ def _alike(path: StripPath) -> npt.NDArray[np.int64]:
 
 
 def _with_forces(measurement: Measurement) -> Measurement:
-    """A measurement without readings that have no force."""
+    """A measurement without readings that have no force.
+
+    Raises:
+        InputError: hardly any reading of a run has one.
+    """
     runs = []
     for run in measurement.runs:
         read = np.isfinite(run.columns["force_N"])
+        if read.sum() < FEWEST:
+            raise InputError(
+                f"{measurement.folder / run.file}: force_N: {int(read.sum())} readings, allowed "
+                f"are {FEWEST} or more of them: it is forces that are compared"
+            )
         runs.append(replace(run, columns={name: c[read] for name, c in run.columns.items()}))
     return replace(measurement, runs=tuple(runs))
