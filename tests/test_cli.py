@@ -294,7 +294,7 @@ main()
 
 
 def test_help_shows_an_example(capsys):
-    for name in ("", *(function.__name__ for function in EXAMPLES)):
+    for name in ("", *(function.__name__.removesuffix("_data") for function in EXAMPLES)):
         with pytest.raises(SystemExit) as ended:
             main([*name.split(), "--help"])
         assert ended.value.code == 0

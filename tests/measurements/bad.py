@@ -192,7 +192,7 @@ CASES: list[Bad] = [
     _file("yaml_python_tag", (YAML,), _python_tag),
     _keys("schema_other", "schema fabric-measurement/1", _set("schema", to="fabric-measurement/9")),
     _keys("schema_missing", "schema", _drop("schema")),
-    _keys("test_unknown", "test bias_extension cantilever", _set("test", to="bias_extension")),
+    _keys("test_unknown", "test biaxial cantilever", _set("test", to="biaxial")),
     _keys("test_missing", "test", _drop("test")),
     _keys("key_unknown", "temperature_K", _set("temperature_K", to=293)),
     _keys("fabric_missing", "fabric", _drop("fabric")),

@@ -38,6 +38,8 @@ Flags = npt.NDArray[np.bool_]
 SCATTER_UNIT, SHARE_UNIT = 0.01, 4e-4
 #: Scatter, in its unit, of specimens that are all but alike.
 HARDLY = 1e-3
+#: Scatter below which specimens may as well be alike.
+SMALL_SCATTER = 0.03
 #: Gain of −2 log likelihood in a step below which it is the last one.
 ENOUGH = 1e-4
 #: ... in all, beyond which that step, which is a share of it, was not yet a small one.
@@ -157,6 +159,12 @@ def estimate(
         even = found.copy()
         even[0], even[2] = np.log(typical / problem.floor), 0.0
         found = min((found, likeliest(even)), key=lambda x: problem.cost(x)[0])
+    taus = problem.split(found)[1]
+    if ((taus > 0.0) & (taus < SMALL_SCATTER)).any():
+        # From scatters that are all small and alike the search may not get to some that are none.
+        alike = found.copy()
+        alike[3 : 3 + len(groups)] = HARDLY
+        found = min((found, likeliest(alike)), key=lambda x: problem.cost(x)[0])
     restricted, likelihood = problem.cost(found)
     if compared and groups:
         # With the components that are likeliest by the likelihood itself, from others.
