@@ -104,8 +104,8 @@ def test_a_dashpot_costs_its_work():
     [
         ("clamp_slip", "share of the travel"),
         ("shear_locking", "power 3"),
-        ("crossover_slip", "at a force"),
-        ("tow_uncrimping", "soft, then stiff"),
+        pytest.param("crossover_slip", "at a force", marks=pytest.mark.slow),
+        pytest.param("tow_uncrimping", "soft, then stiff", marks=pytest.mark.slow),
     ],
 )
 def test_slopes_are_differences(effect, label, monkeypatch):

@@ -43,6 +43,7 @@ def test_picture_frame_carries_the_crossings_moment(tmp_path):
     assert 1e-3 < deviations["viscous"] < 8e-3
 
 
+@pytest.mark.slow
 def test_bias_extension_against_its_formulas(tmp_path):
     """Pinned tows shear less than the formula has it, by some degrees, and slipping ones less yet.
 

@@ -427,7 +427,10 @@ TERMS = {
 }
 
 
-@pytest.mark.parametrize("term", TERMS)
+@pytest.mark.parametrize(
+    "term",
+    ["spring", *(pytest.param(term, marks=pytest.mark.slow) for term in list(TERMS)[1:])],
+)
 def test_a_term_is_in_a_net_what_it_is_in_the_loop(term, tmp_path):
     """A term without a formula, by its keys in a case: out, a hold and back.
 
