@@ -58,6 +58,7 @@ def test_bias_extension_against_its_formulas(tmp_path):
     assert numbers["slip_mm"] > 0.2
 
 
+@pytest.mark.slow
 def test_hidden_friction_is_named(tmp_path):
     """Inside three standard errors of what was put in."""
     loop = demo("hidden_friction")

@@ -149,6 +149,7 @@ def test_free_travel_is_found_beyond_the_next_reading():
     assert found.holdout_after < 1.15 * truth.noise
 
 
+@pytest.mark.slow
 def test_every_form_is_fitted_from_its_best_start():
     # To first order an exponential looks better than the square that it is.
     truth, found = diagnosed(5, "shear_locking-square")

@@ -357,10 +357,10 @@ class _Search:
     def _with_alike_specimens(self, combinations: Sequence[Combination]) -> list[Fit]:
         """Forms of an effect with specimens that hardly differ.
 
-        What the baseline takes for their differences may be all that there is of an effect; a fit
-        that allows for them as they were does not get there.
+        What the baseline takes for their differences, where these are more than usual, may be all
+        that there is of an effect; a fit that allows for them as they were does not get there.
         """
-        if not self.variances.scatter or not self._base.deviations:
+        if max(self.variances.scatter.values(), default=0.0) <= FIRST_SCATTER:
             return []
         allowed = self.variances
         self.variances = Variances(allowed.noise, dict.fromkeys(allowed.scatter, ALIKE))
