@@ -184,6 +184,7 @@ def test_two_rates_on_two_specimens_tell_as_much_as_their_springs_are_alike():
     assert found.baseline.variances.scatter["c1_N_s"] > 0.2
 
 
+@pytest.mark.slow
 def test_a_form_is_not_chosen_by_what_it_foretells():
     """Of forms that fit alike the held-out run has no say, although the cube foretells it better.
 
@@ -227,6 +228,7 @@ def test_one_rate_alone_knows_a_curve_and_not_what_makes_it():
     assert np.median(found.curve.std / np.abs(found.curve.value).max()) < 0.02
 
 
+@pytest.mark.slow
 def test_nothing_is_named_where_the_fitted_readings_show_nothing():
     for name in ("none-shear-logger", "none-shear-hold"):
         for seed in (12, 16):
