@@ -10,8 +10,10 @@ from ufl import as_ufl
 
 from fabric_fenicsx.inputs.python_file import classes_of, run_file
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
+from fabric_fenicsx.loop.kinds.picture_frame import PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.terms import terms
+from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.loop.report.discovered import _shortest
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw
 from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw, shape_of
@@ -302,3 +304,22 @@ def test_two_terms_of_the_travel_add(tmp_path):
 def test_where_nothing_wears_nothing_is_discovered(tmp_path):
     report = diagnose([read_measurement(write(tmp_path / "set", 0.0))]).report
     assert report["verdict"] == "no_effect" and report["discovered"] == []
+
+
+def test_laboratories_with_one_way_each_know_no_term(tmp_path):
+    """Their rates differ as they do themselves; one that goes at two rates knows more."""
+
+    def laboratory(name, *speeds):
+        time = np.linspace(0.0, 1.0, 40)
+        runs = tuple(
+            Run(f"{k}.csv", False, "", {"time_s": time * 30.0 / v, "displacement_mm": 30.0 * time})
+            for k, v in enumerate(speeds)
+        )
+        for run in runs:
+            run.columns["force_N"] = run.columns["displacement_mm"] ** 2
+        fabric = FabricKeys(areal_density_kg_m2=0.2)
+        rig = PictureFrameRig(frame_length_mm=200.0, fabric_length_mm=100.0)
+        return Measurement(tmp_path / name, "picture_frame", "", fabric, rig, 1.0, runs)
+
+    assert PictureFrame([laboratory("a", 0.5), laboratory("b", 5.0)]).terms == []
+    assert PictureFrame([laboratory("a", 0.5), laboratory("b", 0.5, 5.0)]).terms

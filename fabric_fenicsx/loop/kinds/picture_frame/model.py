@@ -63,8 +63,14 @@ class PictureFrame(CrossheadTest):
 
     @cached_property
     def terms(self) -> list[Effect]:
-        """Terms without a formula over what the fitted readings reached."""
-        rows = self.readings.fit
+        """Terms without a formula over what the fitted readings reached.
+
+        None where each laboratory's runs go one way at one rate: rates differ from one to another
+        then as the laboratories do, and nothing but a curve is known.
+        """
+        rows, folder = self.readings.fit, self.readings.folder
+        if all(self._steady(rows & (folder == k)) for k in np.unique(folder[rows])):
+            return []
 
         def most(values: Any) -> float:
             return float(np.abs(self._at_readings(values)[rows]).max())
@@ -92,17 +98,19 @@ class PictureFrame(CrossheadTest):
 
         At one speed of the crosshead or of the angle: the rate is then a function of the angle.
         """
-        rows = self.readings.fit
-        known = self._kinematics(self._points, {})
-        rate = self._at_readings(known["rate"].value)[rows]
-        speed = self._at_readings(self._points["D_rate"].value)[rows]
-        steady = any(
-            np.ptp(v) <= SAME_RATE * float(np.abs(v).max(initial=0.0)) for v in (speed, rate)
-        )
-        if not steady or len(rate) == 0:
+        if not self._steady(self.readings.fit):
             return None
+        known = self._kinematics(self._points, {})
         every = self._at_readings(known["gamma"].value), self._at_readings(known["factor"].value)
         return OneCurve("shear_angle_rad", "moment_N", *every)
+
+    def _steady(self, rows: npt.NDArray[np.bool_]) -> bool:
+        """Whether some readings are of one way at one speed of the crosshead or of the angle."""
+        rate = self._at_readings(self._kinematics(self._points, {})["rate"].value)[rows]
+        speed = self._at_readings(self._points["D_rate"].value)[rows]
+        return len(rate) > 0 and any(
+            np.ptp(v) <= SAME_RATE * float(np.abs(v).max(initial=0.0)) for v in (speed, rate)
+        )
 
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """What a term without a formula depends on, at every reading; see Experiment."""
