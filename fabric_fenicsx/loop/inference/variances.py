@@ -151,6 +151,12 @@ def estimate(
             x, gain = np.asarray(found.x), -found.fun
         return x
 
+    def alike(x: Array) -> Array:
+        """The same with specimens that are all but alike."""
+        other = x.copy()
+        other[3 : 3 + len(groups)] = HARDLY
+        return other
+
     found = likeliest(x0)
     noise = problem.split(found)[0]
     typical = noise.typical(at.readings, at.rows)
@@ -162,17 +168,12 @@ def estimate(
     taus = problem.split(found)[1]
     if ((taus > 0.0) & (taus < SMALL_SCATTER)).any():
         # From scatters that are all small and alike the search may not get to some that are none.
-        alike = found.copy()
-        alike[3 : 3 + len(groups)] = HARDLY
-        found = min((found, likeliest(alike)), key=lambda x: problem.cost(x)[0])
+        found = min((found, likeliest(alike(found))), key=lambda x: problem.cost(x)[0])
     restricted, likelihood = problem.cost(found)
     if compared and groups:
         # With the components that are likeliest by the likelihood itself, from others.
         problem.of = 1
-        alike = found.copy()
-        alike[3 : 3 + len(groups)] = HARDLY
-        other = likeliest(alike)
-        likelihood = min(likelihood, problem.cost(other)[1])
+        likelihood = min(likelihood, problem.cost(likeliest(alike(found)))[1])
     noise, taus, omega = problem.split(found)
     variances = Variances(noise, dict(zip(groups, taus.tolist(), strict=True)))
     return Estimate(variances, omega, restricted, likelihood, problem.white(found))

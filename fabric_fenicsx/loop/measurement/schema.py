@@ -90,6 +90,7 @@ class Run:
         label: free text.
         specimen: name of the specimen; empty where the run is a specimen of its own.
         columns: readings by column, each (n,); an empty optional entry is NaN.
+        own: what only this kind's entries of ``runs`` have, by key.
     """
 
     file: str

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -219,7 +218,7 @@ class BiasExtension(CrossheadTest):
         key = _key(changes)
         known = self._solved.get(key, [])
         apart = [self._apart(curve, one) for one in known]
-        if known and (min(apart) < NEAR or len(known) >= MOST or max(curve.moments) <= 0.0):
+        if known and (min(apart) < NEAR or len(known) >= MOST or curve.idle):
             return known[int(np.argmin(apart))]
         if key in self._failed and not known:
             raise SolveError(self._failed[key])
@@ -374,16 +373,6 @@ class BiasExtension(CrossheadTest):
             for r, way in enumerate(solved.ways):
                 found[:, r] += weight * np.degrees(way.middle(self._points["D"].value[:, r]))
         return self._at_readings(found)
-
-    @cached_property
-    def _given_angles(self) -> Array:
-        """Measured shear angles of the middle zone [degrees], NaN where there is none, (n,)."""
-        return np.concatenate(
-            [
-                run.columns.get("shear_angle_deg", np.full(run.count, np.nan))
-                for _, run in self._runs
-            ]
-        )
 
     @property
     def notes(self) -> list[str]:  # type: ignore[override]

@@ -17,7 +17,6 @@ from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ValidationError
 from scipy.interpolate import PchipInterpolator
 
 from ....errors import InputError
@@ -26,6 +25,7 @@ from ....rigs.bias_extension import BiasExtensionCase, build, clamps, middle_zon
 from ....rigs.common import Session, control
 from ....rigs.crosshead import duration
 from ....solving.stepping import Step, Stepper
+from ...measurement.case import measured_case, tow_of
 from ...measurement.schema import FILE, Measurement, Run
 
 __all__ = ["KNOTS", "Curve", "StripPath", "solved_strip", "strip_case"]
@@ -38,8 +38,8 @@ KNOTS = np.array([0.0, 3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 38.0, 44.0, 50.0, 56.0,
 STEPS = 28
 #: Least slope of a curve over the largest moment: nothing else holds crossings that do nothing.
 LEAST_SLOPE = 1e-3
-#: E I of a tow in the sheet's plane per width [N mm] where a measurement does not give it.
-IN_PLANE = 0.1
+#: Largest moment per area [N/mm] of a curve that does nothing.
+NOTHING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Curve:
     def through(cls, moments: Array) -> Curve:
         """The nearest that does not fall."""
         rising = np.maximum.accumulate(np.maximum(moments, 0.0))
-        least = LEAST_SLOPE * max(float(rising[-1]), 1e-9) * np.radians(KNOTS)
+        least = LEAST_SLOPE * max(float(rising[-1]), NOTHING) * np.radians(KNOTS)
         return cls((0.0, *(rising + least)[1:].tolist()))
 
     def __call__(self, gamma: Array) -> Array:
@@ -66,6 +66,11 @@ class Curve:
         size = np.abs(gamma)
         beyond = np.maximum(size - last, 0.0) * float(cubics.derivative()(last))
         return np.asarray(np.sign(gamma) * (cubics(np.minimum(size, last)) + beyond))
+
+    @property
+    def idle(self) -> bool:
+        """Whether it does next to nothing."""
+        return self.moments[-1] <= NOTHING
 
     def law(self, area: float) -> TabulatedSpring:
         """Of a crossing that stands for an area [mm²]."""
@@ -112,50 +117,32 @@ def strip_case(
     Raises:
         InputError: there can be no such strip.
     """
-    fabric, length, width = measurement.fabric, run.own["length_mm"], run.own["width_mm"]
-    s, a, b = fabric.tow_spacing_mm, fabric.tow.width_mm, fabric.tow.height_mm
-    given = "bending_in_plane_Nmm" in fabric.tow.model_fields_set
-    duration = travel / rate
+    fabric, own = measurement.fabric, run.own
+    tow = tow_of(fabric, fabric.tow.C1_MPa)
+    if "bending_in_plane_Nmm" in fabric.tow.model_fields_set:
+        tow["stiffness"] = {"bending_in_plane_Nmm": fabric.tow.bending_in_plane_Nmm}
+    step = travel / rate / STEPS
     keys: dict[str, Any] = {
         "test": "bias_extension",
-        "length_mm": length,
-        "width_mm": width,
+        "length_mm": own["length_mm"],
+        "width_mm": own["width_mm"],
         "bias_deg": measurement.rig.bias_deg,
-        "warp_spacing_mm": s,
-        "weft_spacing_mm": s,
+        "warp_spacing_mm": fabric.tow_spacing_mm,
+        "weft_spacing_mm": fabric.tow_spacing_mm,
         "travel_mm": travel,
         "rate_mm_min": 60.0 * rate,
         "hold_s": 0.0,
         "unload": False,
-        "tow": {
-            "width_mm": a,
-            "height_mm": b,
-            "density_kg_mm3": 1e-6 * fabric.areal_density_kg_m2 * s / (2.0 * a * b),
-            "C1_MPa": fabric.tow.C1_MPa,
-            "stiffness": {
-                "bending_in_plane_Nmm": fabric.tow.bending_in_plane_Nmm if given else IN_PLANE
-            },
-        },
+        "tow": tow,
         "crossover": {"k1_N_mm": 0.0, "k3_N_mm": 0.0, "dashpot_N_s_mm": 0.0},
         "solver": {
-            "first_step_s": duration / STEPS,
-            "largest_step_s": duration / STEPS,
-            "smallest_step_s": 1e-4 * duration / STEPS,
+            "first_step_s": step,
+            "largest_step_s": step,
+            "smallest_step_s": 1e-4 * step,
         },
     }
-    for dotted, value in changes.items():
-        *groups, name = dotted.split(".")
-        place = keys
-        for group in groups:
-            place = place.setdefault(group, {})
-        place[name] = value
-    try:
-        return BiasExtensionCase.model_validate(keys)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = "".join(f"{part}: " for part in first["loc"])
-        said = f"{key}{first['msg'].removeprefix('Value error, ')}"
-        raise InputError(f"{measurement.folder / FILE}: {run.file}: {said}") from error
+    place = f"{measurement.folder / FILE}: {run.file}"
+    return measured_case(BiasExtensionCase, keys, changes, place)
 
 
 def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:

@@ -13,7 +13,6 @@ from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ValidationError
 from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
 
 from ....errors import InputError, SolveError
@@ -21,6 +20,7 @@ from ....rigs.common import Session, control
 from ....rigs.drape import DrapeCase, build
 from ....rigs.kinematic import kinematic_net
 from ....rigs.simulation import simulate
+from ...measurement.case import measured_case, tow_of
 from ...measurement.schema import FILE, Measurement
 
 __all__ = [
@@ -123,9 +123,6 @@ def drape_case(
 ) -> DrapeCase:
     """The case of a measured drape, a quarter of it.
 
-    The tows' density is such that two families of them weigh what the fabric does,
-    ρ = m_A s/(2 a b) (Wei & Zhang, equation 8, for a large sheet).
-
     Args:
         measurement: of a drape.
         shear: law of the crossings.
@@ -136,7 +133,7 @@ def drape_case(
         InputError: there can be no such case.
     """
     rig, fabric = measurement.rig, measurement.fabric
-    s, a, b = fabric.tow_spacing_mm, fabric.tow.width_mm, fabric.tow.height_mm
+    s = fabric.tow_spacing_mm
     if rig.fabric_size_mm < 4.0 * s:
         raise InputError(
             f"{measurement.folder / FILE}: rig.fabric_size_mm: {rig.fabric_size_mm:g}, "
@@ -151,10 +148,7 @@ def drape_case(
             "weft_spacing_mm": s,
         },
         "tow": {
-            "width_mm": a,
-            "height_mm": b,
-            "density_kg_mm3": 1e-6 * fabric.areal_density_kg_m2 * s / (2.0 * a * b),
-            "C1_MPa": C1,
+            **tow_of(fabric, C1),
             "stiffness": {"bending_in_plane_Nmm": fabric.tow.bending_in_plane_Nmm},
         },
         "crossover": {"k1_N_mm": shear.k1, "k3_N_mm": shear.k3, "dashpot_N_s_mm": shear.c1},
@@ -162,18 +156,7 @@ def drape_case(
     for name in ("punch_radius", "hole_radius", "edge_radius", "punch_travel"):
         keys[f"{name}_mm"] = getattr(rig, f"{name}_mm")
     keys["duration_s"] = rig.duration_s
-    for dotted, value in (changes or {}).items():
-        *groups, name = dotted.split(".")
-        place = keys
-        for group in groups:
-            place = place.setdefault(group, {})
-        place[name] = value
-    try:
-        return DrapeCase.model_validate(keys)
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = ".".join(map(str, first["loc"]))
-        raise InputError(f"{measurement.folder / FILE}: {name}: {first['msg']}") from error
+    return measured_case(DrapeCase, keys, changes or {}, str(measurement.folder / FILE))
 
 
 def solved_field(case: DrapeCase) -> ShearField:
