@@ -31,6 +31,20 @@ class Varying:
     value: Array
     slopes: dict[str, Array] = field(default_factory=dict)
 
+    def __add__(self, other: Varying) -> Varying:
+        """The sum."""
+        slopes: dict[str, Any] = dict(self.slopes)
+        for p, slope in other.slopes.items():
+            slopes[p] = slopes.get(p, 0.0) + slope
+        return Varying(self.value + other.value, slopes)
+
+    def __mul__(self, other: Varying) -> Varying:
+        """The product."""
+        slopes: dict[str, Any] = {p: slope * other.value for p, slope in self.slopes.items()}
+        for p, slope in other.slopes.items():
+            slopes[p] = slopes.get(p, 0.0) + self.value * slope
+        return Varying(self.value * other.value, slopes)
+
 
 class Marched:
     """Expressions of inputs, parameters and memory.

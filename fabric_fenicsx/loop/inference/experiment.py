@@ -12,7 +12,16 @@ import numpy.typing as npt
 
 from .effects import Effect, Parameter, Variant
 
-__all__ = ["NO_DEVIATIONS", "Deviations", "Experiment", "Law", "OneCurve", "Readings", "deviated"]
+__all__ = [
+    "NO_DEVIATIONS",
+    "Another",
+    "Deviations",
+    "Experiment",
+    "Law",
+    "OneCurve",
+    "Readings",
+    "deviated",
+]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -22,6 +31,23 @@ Deviations = Mapping[str, Array]
 """By parameter, how far each specimen is from the common value, as a share, (n_specimens,)."""
 
 NO_DEVIATIONS: Deviations = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Another:
+    """Readings of another quantity among those of a test, in runs of their own.
+
+    They are kept in the unit of the test's quantity, in which they scatter as that does.
+
+    Attributes:
+        name: what was read, with its unit, a column.
+        rows: which readings, flags, (n,).
+        unit: of it, in that of the test's quantity.
+    """
+
+    name: str
+    rows: Flags
+    unit: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +72,7 @@ class Readings:
         model_error: of the model itself, alike at readings near each other, in the unit of the
             readings: Σ_j b_j ξ_j with the columns b_j, (n, m), and independent ξ_j ~ N(0, 1),
             beside the noise; None where the model is taken to be exact.
+        others: quantities beside the one that is compared first; their runs come last.
     """
 
     observed: Array
@@ -61,6 +88,15 @@ class Readings:
     chain: Numbers
     row: Numbers | None = None
     model_error: Array | None = None
+    others: tuple[Another, ...] = ()
+
+    @property
+    def first(self) -> Flags:
+        """Readings of the quantity that the test is known by."""
+        found = np.ones(len(self.observed), dtype=bool)
+        for other in self.others:
+            found &= ~other.rows
+        return found
 
     @property
     def fit(self) -> Flags:

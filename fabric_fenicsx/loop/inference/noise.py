@@ -9,7 +9,9 @@ order autoregression); where the model itself is uncertain by B ξ, that comes o
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +29,7 @@ __all__ = [
     "missed_readings",
     "outliers",
     "quantum",
+    "roughness",
     "whiteness",
 ]
 
@@ -139,13 +142,25 @@ def estimated_noise(residual: Array, readings: Readings, rows: Flags) -> float:
             continue
         r = (residual * readings.weight)[own]
         at = readings.covariates["time [s]"][own] if "time [s]" in readings.covariates else own
-        share = (at[1:-1] - at[:-2]) / np.maximum(at[2:] - at[:-2], 1e-300)
-        share = np.clip(share, 0.0, 1.0)
-        between = r[:-2] * (1.0 - share) + r[2:] * share
-        found.append((r[1:-1] - between) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
-    if not found:
-        return float("nan")
-    return float(1.4826 * np.median(np.abs(np.concatenate(found))))
+        found.append(_off_neighbours(r, at))
+    return _sigma(found)
+
+
+def roughness(lines: Iterable[tuple[Array, Array]]) -> float:
+    """The same of plain numbers: of places and values in several lines; NaN of too few."""
+    return _sigma([_off_neighbours(y, x) for x, y in lines if len(x) > 2])
+
+
+def _off_neighbours(r: Array, at: npt.NDArray[Any]) -> Array:
+    """How far values are from the line through their neighbours, as far as one scatters."""
+    share = (at[1:-1] - at[:-2]) / np.maximum(at[2:] - at[:-2], 1e-300)
+    share = np.clip(share, 0.0, 1.0)
+    between = r[:-2] * (1.0 - share) + r[2:] * share
+    return np.asarray((r[1:-1] - between) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
+
+
+def _sigma(off: list[Array]) -> float:
+    return float(1.4826 * np.median(np.abs(np.concatenate(off)))) if off else float("nan")
 
 
 def quantum(readings: Readings, rows: Flags) -> float:

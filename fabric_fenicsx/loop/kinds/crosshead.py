@@ -27,7 +27,7 @@ from ...mechanics.laws.springs import PolynomialSpring
 from ...mechanics.scalars import derivative_of
 from ..expressions.marching import Marched, Varying
 from ..inference.effects import Effect, Variant, of_run, scaled
-from ..inference.experiment import NO_DEVIATIONS, Deviations, deviated
+from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ..inference.noise import estimated_noise
 from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
@@ -79,7 +79,7 @@ class CrossheadTest:
         known = self._kinematics(self._points, {})
         gamma, rate = (self._shown(known[key].value) for key in ("gamma", "rate"))
         time = self._at_readings(self._points["time"].value)
-        self.readings = readings_of(
+        self.readings = self._read(
             measurements,
             np.concatenate([run.columns["force_N"] for _, run in runs]),
             {
@@ -96,7 +96,7 @@ class CrossheadTest:
             "angle": float(np.abs(gamma).max()),
             "rate": float(np.abs(rate).max()),
             # Not read yet where a run is to be made up.
-            "force": float(np.abs(self.readings.observed).max()) or inf,
+            "force": float(np.abs(self.readings.observed[self.readings.first]).max()) or inf,
             "typical_rate": _typical(np.abs(rate)),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
@@ -113,6 +113,21 @@ class CrossheadTest:
     def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
         """Keep what the kinematics need of the rig, before they are asked for."""
         raise NotImplementedError
+
+    def _read(
+        self,
+        measurements: Sequence[Measurement],
+        observed: Array,
+        covariates: Mapping[str, Array],
+        usable: Flags,
+    ) -> Readings:
+        """The readings of all runs; see readings_of."""
+        return readings_of(measurements, observed, covariates, usable=usable)
+
+    @property
+    def _on_the_load_cell(self) -> Array | float:
+        """One for runs that a load cell reads, else zero, (n_runs,)."""
+        return 1.0
 
     def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
         """An effect in the unit of the data."""
@@ -241,23 +256,19 @@ class CrossheadTest:
                 ahead = self._added(v, "travel", whole, values)
                 travel = self._moved(travel, ahead)
                 whole = self._force(travel, mine, values)
-        force, slopes = whole.value, dict(whole.slopes)
         zeros: list[tuple[Flags, Array]] = []
+        cell = Varying(np.asarray(self._on_the_load_cell))
+        read = whole
         for v in mine:
             if v.added_reading is not None:
-                added = self._added(v, "reading", whole, values)
-                force = force + added.value
-                for p, slope in added.slopes.items():
-                    slopes[p] = slopes.get(p, 0.0) + slope
-            if v.reading is not None:
-                if v.each_run:
-                    added, own_zeros = self._each_run(v, values, force)
-                    zeros += own_zeros
-                else:
-                    added = self._reading(v, values)
-                force = force + added.value
-                for p, slope in added.slopes.items():
-                    slopes[p] = slopes.get(p, 0.0) + slope
+                read += cell * self._added(v, "reading", whole, values)
+            if v.reading is not None and v.each_run:
+                added, own_zeros = self._each_run(v, values, read.value)
+                read += cell * added
+                zeros += own_zeros
+            elif v.reading is not None:
+                read += cell * self._reading(v, values)
+        force, slopes = read.value, read.slopes
         names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
         zero = np.zeros(len(self._place[0]))
         found = {
@@ -289,19 +300,15 @@ class CrossheadTest:
     ) -> Varying:
         """Force [N] that the moments of the crossings make, (n_points, n_runs)."""
         known = self._kinematics(travel, values)
-        moments = [self._moment(None, known, values)]
-        moments += [self._moment(v, known, values) for v in variants if v.laws is not None]
+        moment = self._moment(None, known, values)
+        for v in variants:
+            if v.laws is not None:
+                moment += self._moment(v, known, values)
         factor = known["factor"]
-        slopes: dict[str, Any] = {}
-        for m in moments:
-            for p, slope in m.slopes.items():
-                slopes[p] = slopes.get(p, 0.0) + slope * factor.value
-            for p, slope in factor.slopes.items():
-                slopes[p] = slopes.get(p, 0.0) + m.value * slope
-        shape = factor.value.shape
+        work, shape = moment * factor, factor.value.shape
         return Varying(
-            self._gathered(sum(m.value for m in moments) * factor.value),
-            {p: self._gathered(np.broadcast_to(slope, shape)) for p, slope in slopes.items()},
+            self._gathered(work.value),
+            {p: self._gathered(np.broadcast_to(slope, shape)) for p, slope in work.slopes.items()},
         )
 
     def _added(
@@ -345,16 +352,9 @@ class CrossheadTest:
 
     def _moved(self, travel: Any, ahead: Varying) -> dict[str, Varying]:
         """A travel with what is added to it, and its rate."""
-
-        def total(a: Varying, b: Varying) -> Varying:
-            slopes: dict[str, Any] = dict(a.slopes)
-            for p, slope in b.slopes.items():
-                slopes[p] = slopes.get(p, 0.0) + slope
-            return Varying(a.value + b.value, slopes)
-
         return {
-            "D": total(travel["D"], ahead),
-            "D_rate": total(travel["D_rate"], self._per_second(ahead)),
+            "D": travel["D"] + ahead,
+            "D_rate": travel["D_rate"] + self._per_second(ahead),
         }
 
     def _moment(
@@ -396,7 +396,7 @@ class CrossheadTest:
 
     def _with_runs(self, effect: Effect) -> Effect:
         """Parameters of their own for each run that is fitted, where a form wants them."""
-        runs = np.unique(self.readings.run[self.readings.fit])
+        runs = np.unique(self.readings.run[self.readings.fit & self.readings.first])
 
         def expanded(v: Variant) -> Variant:
             if not (isinstance(v, FrameVariant) and v.each_run):
@@ -406,7 +406,7 @@ class CrossheadTest:
 
         each = [v for v in effect.variants if getattr(v, "each_run", False)]
         shared = [v for v in effect.variants if v not in each]
-        if len(self.readings.names) == 1:
+        if len(np.unique(self.readings.run[self.readings.first])) == 1:
             each = []
         elif each and len(runs) == 1:
             # One fitted run cannot tell the two apart: nothing is claimed of the other runs.
@@ -434,7 +434,7 @@ class CrossheadTest:
         shape = self._points["time"].value.shape
         total, found = np.zeros(shape), {}
         left = self.readings.observed - self._at_readings(force)
-        for run in range(shape[1]):
+        for run in np.flatnonzero(np.broadcast_to(self._on_the_load_cell, shape[1])):
             rows = self.readings.run == run
             own = {n: np.broadcast_to(c, shape)[:, run] for n, c in columns.items()}
             if f"run{run + 1}_{next(iter(names))}" in values:

@@ -61,7 +61,17 @@ def read_folder(folder: Path, kinds: Sequence[Kind]) -> Measurement:
         holdout = entry.role == "holdout"
         runs.append(Run(entry.file, holdout, entry.label, columns, entry.specimen, own))
     noise = getattr(keys.noise, kind.quantity)
-    return Measurement(folder, kind.name, keys.title, keys.fabric, keys.rig, noise, tuple(runs))
+    sigmas = {name: getattr(keys.noise, name) for name in kind.besides}
+    return Measurement(
+        folder,
+        kind.name,
+        keys.title,
+        keys.fabric,
+        keys.rig,
+        noise,
+        tuple(runs),
+        {name: sigma for name, sigma in sigmas.items() if sigma is not None},
+    )
 
 
 def measurement_models(kinds: Sequence[Kind]) -> dict[str, type[MeasurementKeys]]:

@@ -118,6 +118,7 @@ class Measurement:
         rig: the rig, keys of the kind.
         noise: one sigma of a reading of what is compared; None where it is not given.
         runs: the readings.
+        besides: one sigma of what is compared beside it, by column, where it is given.
     """
 
     folder: Path
@@ -127,6 +128,7 @@ class Measurement:
     rig: Any
     noise: float | None
     runs: tuple[Run, ...]
+    besides: Mapping[str, float] = field(default_factory=dict)
 
 
 def fabric_keys(tow: TowKeys, warp_spacing: float, weft_spacing: float) -> FabricKeys:

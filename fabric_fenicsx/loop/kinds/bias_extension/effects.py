@@ -31,10 +31,13 @@ class StripPullVariant(FrameVariant):
             the value of the first parameter, an amplitude; not asked for at zero, the baseline.
         solved_at: values of that amplitude at which the strip is solved when it is needed, zero
             apart; in between it is interpolated. In the unit of its starts and bounds.
+        per_force: the amplitude is one over a force. What it does then goes by its product with
+            the moments of the crossings, and the forces of the strip with these.
     """
 
     changes: Callable[[float], Mapping[str, Any]] | None = None
     solved_at: tuple[float, ...] = ()
+    per_force: bool = False
 
 
 SLIP = Parameter(
@@ -91,7 +94,8 @@ BIAS_EXTENSION_EFFECTS = (
                     # Of no weight beside the slip, in half the iterations.
                     "crossover.translation_N_mm": 10.0,
                 },
-                solved_at=(2.5, 10.0, 40.0),
+                solved_at=(0.6, 1.2, 2.5, 5.0, 10.0, 20.0, 40.0),
+                per_force=True,
             ),
         ),
     ),
@@ -104,7 +108,7 @@ BIAS_EXTENSION_EFFECTS = (
                 "soft, then stiff",
                 (CRIMP,),
                 changes=lambda strain: {"tow.crimp_strain": strain},
-                solved_at=(0.01, 0.03, 0.06),
+                solved_at=(0.01, 0.02, 0.03, 0.045, 0.06),
             ),
         ),
     ),

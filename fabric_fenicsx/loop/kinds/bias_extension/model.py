@@ -15,28 +15,32 @@ that go alike are taken together.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from ....errors import InputError, SolveError
+from ....errors import SolveError
 from ....fabric.bias_strip import BiasStrip
 from ...expressions.marching import Varying
 from ...inference.effects import Effect, Variant
+from ...inference.experiment import Readings
 from ...measurement.schema import Measurement, Run
 from ..crosshead import CrossheadTest, shifted
 from ..drape.shear_field import hermite_weights
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
+from .quantities import read_together
 from .strip import KNOTS, Curve, StripPath, solved_strip, strip_case
 
 __all__ = ["BiasExtension"]
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 #: Groups of crossings that go alike.
 GROUPS = 24
@@ -46,6 +50,8 @@ ALONG = 60
 NEAR = 0.2
 #: ... and how often a strip is solved anew, at most, for each kind of motion.
 MOST = 8
+#: Least work of moments, over that of the first curve, that strips slip at.
+LEAST_SIZE = 1e-6
 #: k1 and k3 [N/mm] of the curve that strips are first solved with where readings tell nothing ...
 FIRST = (0.002, 0.02)
 #: ... fewer than this many of them.
@@ -77,8 +83,18 @@ class _Solved:
     ways: tuple[_Way, ...]
 
 
-Mixture = list[tuple[_Solved, float, dict[str, float]]]
-"""Solutions with their weights, and the weights' derivatives by parameter."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """Solved strips among those of a model: their weight, and how much larger its forces are.
+
+    Attributes:
+        solved: the strips.
+        weight, size: numbers with their derivatives by parameter.
+    """
+
+    solved: _Solved
+    weight: Varying
+    size: Varying = field(default_factory=lambda: _number(1.0))
 
 
 class BiasExtension(CrossheadTest):
@@ -98,7 +114,9 @@ class BiasExtension(CrossheadTest):
         self._solved: dict[str, list[_Solved]] = {}
         self._failed: dict[str, str] = {}
         self._surprises: list[float] = []
-        super().__init__([_with_forces(m) for m in measurements], own, like)
+        self._together = read_together(measurements)
+        self._angles, self._parent = self._together.angles, self._together.parent
+        super().__init__(self._together.measurements, own, like)
 
     # Rig ----------------------------------------------------------------------------------
 
@@ -108,25 +126,54 @@ class BiasExtension(CrossheadTest):
     def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
         D, time = self._points["D"].value, self._points["time"].value
         self._runs = list(runs)
-        self._furthest = D.max(axis=0)
         out = np.argmax(D, axis=0)
         columns = np.arange(len(runs))
-        self._speed = self._furthest / np.maximum(time[out, columns] - time[0], 1e-9)
+        speed = D.max(axis=0) / np.maximum(time[out, columns] - time[0], 1e-9)
+        # Forces and angles of a strip are of one way.
+        same = [self._parent == parent for parent in self._parent]
+        self._furthest = np.array([D.max(axis=0)[own].max() for own in same])
+        self._speed = speed[self._parent]
         self._groups: list[npt.NDArray[np.int64]] | None = None
-        for (m, run), travel, speed in zip(runs, self._furthest, self._speed, strict=True):
-            strip_case(m, run, float(travel), float(speed), {})
+        for (m, run), travel, own_speed in zip(runs, self._furthest, self._speed, strict=True):
+            strip_case(m, run, float(travel), float(own_speed), {})
         # Of the curve that laws with memory and dashpots follow, the same throughout.
         angles = [
             _strip(m, run).angle(0.5 * D) for (m, run), D in zip(runs, self._furthest, strict=True)
         ]
         rates = 2.0 * np.array(angles) / self._furthest * self._speed
         self._typical_rate = float(np.nanmedian(rates))
-        self._mixture: Mixture = [(self._solve({}, self._first_curve()), 1.0, {})]
+        first = self._solve({}, self._first_curve())
+        self._mixture = [_Part(first, _number(1.0))]
+        self._reached = _reached(first, self._furthest)
+        self._reached /= float(self._reached @ first.curve.moments)
+
+    def _read(
+        self,
+        measurements: Sequence[Measurement],
+        observed: Array,
+        covariates: Mapping[str, Array],
+        usable: Flags,
+    ) -> Readings:
+        found = super()._read(measurements, observed, covariates, usable)
+        return self._together.named(found)
+
+    @property
+    def _on_the_load_cell(self) -> Array:
+        return np.where(self._angles, 0.0, 1.0)
+
+    def _of_forces(self) -> list[tuple[Measurement, Run]]:
+        """Runs of forces in which there are any."""
+        every = zip(self._runs, self._angles, strict=True)
+        return [
+            (m, run)
+            for (m, run), angle in every
+            if not angle and np.isfinite(run.columns["force_N"]).any()
+        ]
 
     def _first_curve(self) -> Curve:
         """As the energy of zones of constant shear has it; where that is not known, a cubic."""
         gamma, found = np.radians(KNOTS), []
-        for m, run in self._runs:
+        for m, run in self._of_forces():
             D, force = run.columns["displacement_mm"], run.columns["force_N"]
             strip = _strip(m, run)
             if run.holdout or strip.bias != 45.0 or strip.length < 2.0 * strip.width:
@@ -154,9 +201,9 @@ class BiasExtension(CrossheadTest):
             float(np.abs(run.columns["force_N"]).max())
             * m.fabric.tow_spacing_mm
             / run.own["width_mm"]
-            for m, run in self._runs
+            for m, run in self._of_forces()
         ]
-        return {"per_tow_force": 1.0 / max(*per_tow, 1e-9)}
+        return {"per_tow_force": 1.0 / max([*per_tow, 1e-9])}
 
     def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
         found = super()._scaled(effect, shares)
@@ -258,28 +305,36 @@ class BiasExtension(CrossheadTest):
             size.append(force)
         return float(np.linalg.norm(np.concatenate(off)) / np.linalg.norm(np.concatenate(size)))
 
-    def _mixed(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Mixture:
-        """What is known of the strips of a model, solved now where that is not enough."""
-        curve = self._curve(variants, values)
-        base, base_slopes = 1.0, dict[str, float]()
-        found: Mixture = []
+    def _mixed(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[_Part]:
+        """What is known of the strips of a model, solved now where that is not enough.
+
+        Slip at a force F0 with moments m is that at F0/s with moments m/s, in forces s times as
+        small: strips that slip are solved with moments of one size.
+        """
+        moments = self._moments(variants, values)
+        curve = Curve.through(moments.value)
+        base, found = _number(1.0), list[_Part]()
         for v in variants:
             if not isinstance(v, StripPullVariant) or v.changes is None:
                 continue
             name = v.parameters[0].name
-            nodes, weights, slopes = hermite_weights(v.solved_at, values[name])
-            for node, weight, slope in zip(nodes, weights, slopes, strict=True):
+            amplitude, size, mine = _number(values[name], {name: 1.0}), _number(1.0), curve
+            if v.per_force:
+                size = self._size(moments)
+                amplitude = amplitude * size
+                mine = Curve.through(moments.value / size.value)
+            at = float(amplitude.value)
+            for node, weight, slope in zip(*hermite_weights(v.solved_at, at), strict=True):
+                part = _number(weight, {p: slope * d for p, d in amplitude.slopes.items()})
                 if node == 0.0:
-                    base += weight - 1.0
-                    base_slopes[name] = slope
+                    base += part
                 else:
-                    found.append((self._nearest(v.changes(node), curve), weight, {name: slope}))
-            if 0.0 not in nodes:
-                base -= 1.0
-        return [(self._nearest({}, curve), base, base_slopes), *found]
+                    found.append(_Part(self._nearest(v.changes(node), mine), part, size))
+            base += _number(-1.0)
+        return [_Part(self._nearest({}, curve), base), *found]
 
-    def _curve(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Curve:
-        """The moments of a model's laws on one way out at the speed of the runs."""
+    def _moments(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Varying:
+        """The moments of a model's laws on one way out at the speed of the runs, at KNOTS."""
         gamma = np.linspace(0.0, np.radians(KNOTS[-1]), ALONG)[:, None]
         rate = self._typical_rate
         known = {
@@ -289,9 +344,23 @@ class BiasExtension(CrossheadTest):
             "per_time": Varying(np.full_like(gamma, rate / float(gamma[1, 0]))),
         }
         laws = [v for v in variants if isinstance(v, FrameVariant) and v.laws is not None]
-        moments = [self._moment(v, known, values).value for v in (None, *laws)]
-        total = np.broadcast_to(sum(moments), gamma.shape)[:, 0]
-        return Curve.through(np.interp(np.radians(KNOTS), gamma[:, 0], total))
+        total = _number(0.0)
+        for v in (None, *laws):
+            total += self._moment(v, known, values)
+
+        def at_knots(along: Array) -> Array:
+            whole = np.broadcast_to(along, gamma.shape)[:, 0]
+            return np.interp(np.radians(KNOTS), gamma[:, 0], whole)
+
+        return Varying(at_knots(total.value), {p: at_knots(s) for p, s in total.slopes.items()})
+
+    def _size(self, moments: Varying) -> Varying:
+        """Work of moments at KNOTS, over that of the first strips' curve on the same way."""
+        size = _number(
+            float(self._reached @ moments.value),
+            {p: float(self._reached @ slope) for p, slope in moments.slopes.items()},
+        )
+        return size if size.value > LEAST_SIZE else _number(LEAST_SIZE)
 
     # Model --------------------------------------------------------------------------------
 
@@ -305,14 +374,16 @@ class BiasExtension(CrossheadTest):
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]
-        area = np.concatenate([way.area for way in self._mixture[0][0].ways])
+        area = np.concatenate([way.area for way in self._mixture[0].solved.ways])
         shape = (len(D.value), len(area))
         gamma, first, second = (Varying(np.zeros(shape)) for _ in range(3))
-        for solved, weight, slopes in self._mixture:
+        for part in self._mixture:
             for order, total in enumerate((gamma, first, second)):
-                own = np.hstack([w.gamma(D.value[:, r], order) for r, w in enumerate(solved.ways)])
-                total.value[:] += weight * own
-                for name, slope in slopes.items():
+                own = np.hstack(
+                    [w.gamma(D.value[:, r], order) for r, w in enumerate(part.solved.ways)]
+                )
+                total.value[:] += part.weight.value * own
+                for name, slope in part.weight.slopes.items():
                     total.slopes[name] = total.slopes.get(name, 0.0) + slope * own
 
         def each(values: Array) -> Array:
@@ -348,19 +419,38 @@ class BiasExtension(CrossheadTest):
     ) -> Varying:
         self._mixture = self._mixed(variants, values)
         whole = super()._force(travel, variants, values)
-        D = travel["D"]
-        value, slopes = whole.value.copy(), dict(whole.slopes)
-        for solved, weight, by in self._mixture:
-            rest, change = (
-                np.stack([w.rest(D.value[:, r], k) for r, w in enumerate(solved.ways)], axis=1)
+        found = whole + self._of_ways(travel["D"], "rest")
+        if not self._angles.any():
+            return found
+        # Of runs of angles nothing else counts.
+        degree = np.asarray(np.degrees(self._together.unit))
+        angles = self._of_ways(travel["D"], "middle") * Varying(degree)
+        return Varying(
+            np.where(self._angles, angles.value, found.value),
+            {
+                p: np.where(self._angles, angles.slopes.get(p, 0.0), found.slopes.get(p, 0.0))
+                for p in found.slopes | angles.slopes
+            },
+        )
+
+    def _of_ways(self, D: Varying, name: str) -> Varying:
+        """What the ways of a model's strips say, (n_points, n_runs): their rest, or the angle.
+
+        The first goes with the size of the forces.
+        """
+        total = _number(0.0)
+        for part in self._mixture:
+            value, change = (
+                np.stack(
+                    [getattr(w, name)(D.value[:, r], k) for r, w in enumerate(part.solved.ways)],
+                    axis=1,
+                )
                 for k in (0, 1)
             )
-            value += weight * rest
-            for name, slope in by.items():
-                slopes[name] = slopes.get(name, 0.0) + slope * rest
-            for name, slope in D.slopes.items():
-                slopes[name] = slopes.get(name, 0.0) + weight * change * slope
-        return Varying(value, slopes)
+            own = Varying(value, {p: change * slope for p, slope in D.slopes.items()})
+            weight = part.weight * part.size if name == "rest" else part.weight
+            total += weight * own
+        return total
 
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """Nothing: there are no such terms of a strip; see Experiment."""
@@ -368,11 +458,8 @@ class BiasExtension(CrossheadTest):
 
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
         """Mean shear angle of the middle zone at every reading [degrees], (n,)."""
-        found = np.zeros_like(self._points["D"].value)
-        for solved, weight, _ in self._mixed(variants, values):
-            for r, way in enumerate(solved.ways):
-                found[:, r] += weight * np.degrees(way.middle(self._points["D"].value[:, r]))
-        return self._at_readings(found)
+        self._mixture = self._mixed(variants, values)
+        return self._at_readings(np.degrees(self._of_ways(self._points["D"], "middle").value))
 
     @property
     def notes(self) -> list[str]:  # type: ignore[override]
@@ -395,6 +482,23 @@ def _strip(measurement: Measurement, run: Run) -> BiasStrip:
     return BiasStrip(run.own["length_mm"], run.own["width_mm"], measurement.rig.bias_deg)
 
 
+def _reached(solved: _Solved, furthest: Array) -> Array:
+    """Weights of moments at KNOTS that make the work of all strips on their way, (n_knots,).
+
+    Of crossings that got to γ_c, Σ A ∫ m dγ from 0 to γ_c, with m straight between knots.
+    """
+    gamma = np.linspace(0.0, np.radians(KNOTS[-1]), 8 * ALONG)
+    area = np.zeros_like(gamma)
+    for way, D in zip(solved.ways, furthest, strict=True):
+        area += np.sum(way.area * (way.gamma(D) > gamma[:, None]), axis=1)
+    shapes = np.stack([np.interp(gamma, np.radians(KNOTS), unit) for unit in np.eye(len(KNOTS))])
+    return np.asarray(shapes @ area * (gamma[1] - gamma[0]))
+
+
+def _number(value: float, slopes: Mapping[str, Any] = MappingProxyType({})) -> Varying:
+    return Varying(np.asarray(value), {p: np.asarray(slope) for p, slope in slopes.items()})
+
+
 def _key(changes: Mapping[str, Any]) -> str:
     return ", ".join(f"{name} = {value:g}" for name, value in changes.items())
 
@@ -406,21 +510,3 @@ def _alike(path: StripPath) -> npt.NDArray[np.int64]:
     group = np.empty(len(order), dtype=np.int64)
     group[order] = np.minimum((share * GROUPS * (1.0 - 1e-12)).astype(int), GROUPS - 1)
     return group
-
-
-def _with_forces(measurement: Measurement) -> Measurement:
-    """A measurement without readings that have no force.
-
-    Raises:
-        InputError: hardly any reading of a run has one.
-    """
-    runs = []
-    for run in measurement.runs:
-        read = np.isfinite(run.columns["force_N"])
-        if read.sum() < FEWEST:
-            raise InputError(
-                f"{measurement.folder / run.file}: force_N: {int(read.sum())} readings, allowed "
-                f"are {FEWEST} or more of them: it is forces that are compared"
-            )
-        runs.append(replace(run, columns={name: c[read] for name, c in run.columns.items()}))
-    return replace(measurement, runs=tuple(runs))

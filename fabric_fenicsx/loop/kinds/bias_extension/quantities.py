@@ -1,0 +1,140 @@
+"""What is read of a strip, forces and the angles of its middle, as runs of their own.
+
+Angles are taken in newtons, so many to a degree that they scatter as forces do: then one sigma
+holds for both, and a fit weighs them by what they are worth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ....errors import InputError
+from ...inference.experiment import Another, Readings
+from ...inference.noise import roughness
+from ...measurement.readings import common_noise
+from ...measurement.schema import Measurement, Run
+
+__all__ = ["ANGLE", "ReadTogether", "read_together"]
+
+Flags = npt.NDArray[np.bool_]
+
+ANGLE = "shear_angle_deg"
+#: Fewest readings of a run of either quantity.
+FEWEST = 4
+#: Least sigma [degrees] of an angle, and least share of the largest force of a force, where it is
+#: not given: what authors have smoothed is not known that well.
+LEAST_ANGLE, LEAST_FORCE = 0.5, 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class ReadTogether:
+    """Runs of forces, in their order, and after them runs of angles.
+
+    Attributes:
+        measurements: with a column force_N in each run, which in runs of angles is these [N].
+        parent: number of the run of forces that each belongs to, (n_runs,).
+        unit: a degree [N].
+        sigma: of an angle [degrees], and whether it was given.
+    """
+
+    measurements: tuple[Measurement, ...]
+    parent: npt.NDArray[np.int64]
+    unit: float
+    sigma: tuple[float, bool]
+
+    @property
+    def angles(self) -> Flags:
+        """Runs of angles, (n_runs,)."""
+        return np.arange(len(self.parent)) > self.parent
+
+    def named(self, readings: Readings) -> Readings:
+        """The readings of all runs, with what they are and which specimen they are of."""
+        rows = self.angles[readings.run]
+        parent = self.parent[readings.run]
+        firsts = np.array([np.argmax(readings.run == run) for run in range(len(self.parent))])
+        specimen, folder = (v[firsts][parent] for v in (readings.specimen, readings.folder))
+        return replace(
+            readings,
+            specimen=specimen,
+            specimens=readings.specimens[: int(specimen.max()) + 1],
+            folder=folder,
+            usable=readings.usable & np.isfinite(readings.observed),
+            observed=np.nan_to_num(readings.observed),
+            others=(Another(ANGLE, rows, self.unit),) if rows.any() else (),
+        )
+
+
+def read_together(measurements: Sequence[Measurement]) -> ReadTogether:
+    """Take the angles of runs apart from their forces.
+
+    Raises:
+        InputError: hardly any reading of a run has a force or an angle.
+    """
+    known = [run.columns.get(ANGLE) for m in measurements for run in m.runs]
+    if all(angle is None or not np.isfinite(angle).any() for angle in known):
+        known = []
+    forces = [replace(m, runs=tuple(_forces(m, run) for run in m.runs)) for m in measurements]
+    every = [(m, run) for m in measurements for run in m.runs]
+    count = len(every)
+    if not known:
+        return ReadTogether(tuple(forces), np.arange(count), 1.0, (np.nan, False))
+    given = [m.besides.get(ANGLE) for m in measurements]
+    stated = [sigma for sigma in given if sigma is not None]
+    sigma = float(np.sqrt(np.mean(np.square(stated)))) if stated else _rough(every, ANGLE)
+    if not stated:
+        sigma = max(np.nan_to_num(sigma), LEAST_ANGLE)
+    noise = common_noise(measurements)
+    if noise is None:
+        largest = max(float(np.nanmax(np.abs(r.columns["force_N"]), initial=0.0)) for _, r in every)
+        noise = max(float(np.nan_to_num(_rough(every, "force_N"))), LEAST_FORCE * largest) or 1.0
+    unit = noise / sigma
+    angles = [replace(m, runs=tuple(_angles(run, unit) for run in m.runs)) for m in measurements]
+    parents = [n for n, (_, run) in enumerate(every) if _count(run, ANGLE) >= FEWEST]
+    kept = [replace(m, runs=tuple(r for r in m.runs if r.count >= FEWEST)) for m in angles]
+    return ReadTogether(
+        (*forces, *(m for m in kept if m.runs)),
+        np.array([*range(count), *parents]),
+        unit,
+        (sigma, bool(stated)),
+    )
+
+
+def _count(run: Run, column: str) -> int:
+    values = run.columns.get(column)
+    return 0 if values is None else int(np.isfinite(values).sum())
+
+
+def _rough(runs: Sequence[tuple[Measurement, Run]], column: str) -> float:
+    """Scatter of neighbouring readings of a column."""
+    lines = []
+    for _, run in runs:
+        if _count(run, column):
+            read = np.isfinite(run.columns[column])
+            lines.append((run.columns["time_s"][read], run.columns[column][read]))
+    return roughness(lines)
+
+
+def _forces(measurement: Measurement, run: Run) -> Run:
+    """A run without readings that have no force; all of them where hardly any has one."""
+    columns = {name: run.columns[name] for name in ("time_s", "displacement_mm", "force_N")}
+    if _count(run, "force_N") < FEWEST:
+        if _count(run, ANGLE) < FEWEST:
+            raise InputError(
+                f"{measurement.folder / run.file}: {_count(run, 'force_N')} readings of force_N "
+                f"and {_count(run, ANGLE)} of {ANGLE}, allowed are {FEWEST} or more of one of them"
+            )
+        return replace(run, columns=columns | {"force_N": np.full(run.count, np.nan)})
+    read = np.isfinite(columns["force_N"])
+    return replace(run, columns={name: column[read] for name, column in columns.items()})
+
+
+def _angles(run: Run, unit: float) -> Run:
+    """The angles of a run, in newtons."""
+    read = np.isfinite(run.columns.get(ANGLE, np.full(run.count, np.nan)))
+    columns = {name: run.columns[name][read] for name in ("time_s", "displacement_mm")}
+    columns["force_N"] = unit * run.columns[ANGLE][read] if read.any() else np.zeros(0)
+    return replace(run, columns=columns, label=f"{run.label or run.file}, angle")
