@@ -15,11 +15,28 @@ from .fitting import Fit
 from .judge import Laboratory
 from .noise import Noise, Whiteness
 
-__all__ = ["Candidate", "Diagnosis", "Verdict"]
+__all__ = ["Beside", "Candidate", "Diagnosis", "Verdict"]
 
 Flags = npt.NDArray[np.bool_]
 Pair = tuple[str, list[Fit], str, list[Fit]]
 Verdict = Literal["no_effect", "effect_found", "effect_discovered", "unexplained"]
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """Errors in a quantity beside the first, in its own unit: fitted and held out.
+
+    Attributes:
+        name: what was read, a column.
+        before, after, best: of the baseline, the reported model and the nearest one.
+        noise: one sigma of a reading.
+    """
+
+    name: str
+    before: tuple[float, float]
+    after: tuple[float, float]
+    best: tuple[float, float]
+    noise: float
 
 
 @dataclass(slots=True)
@@ -66,6 +83,7 @@ class Diagnosis:
         white_before, white_after: tests of the residuals.
         outliers: readings that were left out, (n,).
         curve: what readings know that are all on one curve; None where they know more.
+        others: errors in quantities beside the first.
         laboratories: where there are several folders, what the others say of each.
         pairs: effects that are not told apart, with the models of each that fit as well.
         of_the_curve: effects that are such a curve, where one was looked for.
@@ -95,6 +113,7 @@ class Diagnosis:
     criterion_after: float = float("nan")
     curve: Curve | None = None
     of_the_curve: tuple[str, ...] = ()
+    others: tuple[Beside, ...] = ()
     laboratories: tuple[Laboratory, ...] = ()
     pairs: list[Pair] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)

@@ -265,14 +265,19 @@ class Judge:
 
         return all(significant(variant) for variant in model.fit.variants)
 
-    def holdout(self, model: Fit) -> float:
-        """Held-out error: of the holdout runs, or of each part predicted from the others."""
-        out = self.held_rows
-        return model.rms(out) if out.any() else self.left_out(model).error
+    def holdout(self, model: Fit, rows: Flags | None = None) -> float:
+        """Held-out error: of the holdout runs, or of each part predicted from the others.
+
+        Args:
+            model: the fit.
+            rows: of which quantity, flags; by default the first.
+        """
+        out, own = self.held_rows, self._readings.first if rows is None else rows
+        return model.rms(out & own) if out.any() else self.left_out(model).error(own)
 
     def expected_holdout(self, model: Fit, noise: float) -> float:
         """What the model itself expects the held-out error of holdout runs to be; NaN without."""
-        out = self.held_rows
+        out = self.held_rows & self._readings.first
         return float(np.hypot(noise, model.prediction_std(out))) if out.any() else float("nan")
 
     @property

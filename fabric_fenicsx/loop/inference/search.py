@@ -21,9 +21,9 @@ import numpy as np
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
-from .diagnosis import Candidate, Diagnosis, Pair, Verdict
+from .diagnosis import Beside, Candidate, Diagnosis, Pair, Verdict
 from .effects import Effect, Variant
-from .experiment import Experiment
+from .experiment import Another, Experiment
 from .fitting import Fit, fit, parameters_of
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise, quantum
@@ -217,8 +217,21 @@ class _Search:
             criterion_after=final.criterion,
             curve=curve,
             of_the_curve=of_the_curve,
+            others=self._others(baseline.fit, final.fit, nearest.fit, misfit.noise),
             laboratories=tuple(self.judge.laboratories(judged.fit, misfit.noise)),
             notes=[*self.experiment.notes, *self._notes(final.fit, baseline.fit)],
+        )
+
+    def _others(self, before: Fit, after: Fit, best: Fit, noise: float) -> tuple[Beside, ...]:
+        """Errors in the quantities beside the first."""
+
+        def errors(model: Fit, other: Another) -> tuple[float, float]:
+            fitted, held = model.rms(model.used & other.rows), self.judge.holdout(model, other.rows)
+            return fitted / other.unit, held / other.unit
+
+        return tuple(
+            Beside(a.name, errors(before, a), errors(after, a), errors(best, a), noise / a.unit)
+            for a in self.experiment.readings.others
         )
 
     def _looked_through(self) -> tuple[list[Candidate], list[list[Model]]]:

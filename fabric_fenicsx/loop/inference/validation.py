@@ -31,17 +31,23 @@ class CrossValidation:
     """How well parts of the fitted readings are predicted from the others.
 
     Attributes:
-        error: root mean square; NaN where no part could be predicted.
+        off: what the predictions miss of each reading, times its weight, (n,); NaN of those that
+            were in no part, or in one that could not be predicted.
         predictive: the same over sigma, less what predictions allow for; see Fit.predictive_rms.
         parts: that were left out in turn.
         failed: those of them that could not be predicted: too few readings are left, or the model
             has no solution there.
     """
 
-    error: float
+    off: npt.NDArray[np.float64]
     predictive: float
     parts: int
     failed: int
+
+    def error(self, rows: Flags) -> float:
+        """Root mean square over some readings; NaN where none of them could be predicted."""
+        found = self.off[rows & np.isfinite(self.off)]
+        return float(np.sqrt(np.mean(found**2))) if len(found) else float("nan")
 
 
 def stretches(readings: Readings, rows: Flags) -> list[Flags]:
@@ -68,20 +74,19 @@ def parts_by(number: npt.NDArray[np.int64], rows: Flags) -> list[Flags]:
 
 def cross_validated(experiment: Experiment, model: Fit, parts: Sequence[Flags]) -> CrossValidation:
     """Predict parts of what a model was fitted to, each from the others."""
-    total, allowed, count, failed = 0.0, 0.0, 0, 0
+    off = np.full(len(model.used), np.nan)
+    allowed, count, failed = 0.0, 0, 0
     for part in parts:
         again = fitted_without(experiment, model, part)
         if again is None:
             failed += 1
             continue
         size = int(part.sum())
-        total += size * again.rms(part) ** 2
+        off[part] = (again.residual * again.readings.weight)[part]
         allowed += size * again.predictive_rms(part) ** 2
         count += size
-    if not count:
-        return CrossValidation(float("nan"), float("nan"), len(parts), failed)
-    error, predictive = float(np.sqrt(total / count)), float(np.sqrt(allowed / count))
-    return CrossValidation(error, predictive, len(parts), failed)
+    predictive = float(np.sqrt(allowed / count)) if count else float("nan")
+    return CrossValidation(off, predictive, len(parts), failed)
 
 
 def fitted_without(experiment: Experiment, model: Fit, part: Flags) -> Fit | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
@@ -61,7 +61,7 @@ class Kind:
         run: keys of an entry of ``runs``.
         quantity: what is compared, a column; also the key of its noise.
         label: that, with its unit, as on an axis.
-        besides: further columns whose noise may be given.
+        besides: labels of further columns that are compared, whose noise may be given too.
         columns: of each CSV file.
         fewest: readings without which a file says nothing.
         experiment: from measurements of this kind and a user's own effects to a model of them;
@@ -89,7 +89,7 @@ class Kind:
         ()
     )
     run: type[RunKeys] = RunKeys
-    besides: tuple[str, ...] = ()
+    besides: Mapping[str, str] = field(default_factory=dict)
     made_up: Callable[..., MadeUp] | None = None
     options: tuple[str, ...] = ()
     proposals: Callable[[Sequence[Measurement]], list[Proposal]] = lambda measurements: []

@@ -48,7 +48,7 @@ def test_report(
         The content of report.json; a number that is not finite is None.
     """
     d, noise = diagnosis, diagnosis.noise
-    rows, nearest = d.baseline.used, nearest_model(d)
+    rows, nearest = d.baseline.used & d.experiment.readings.first, nearest_model(d)
     compared = d.experiment.readings.usable & ~d.outliers
     checks = predictive_check(nearest, compared) if compared.any() else []
     content = {
@@ -124,6 +124,8 @@ def test_report(
         ],
         "notes": list(d.notes),
     }
+    if d.others:
+        content["errors"] = [content["error"], *_errors(d)]
     numbers: dict[str, Any] = finite(content)
     return numbers | {"headline": headline(numbers), "reasons": reasons(numbers)}
 
@@ -173,6 +175,21 @@ def scatter(model: Fit) -> dict[str, dict[str, float]]:
         group: {"share": tau, "std": tau / float(np.sqrt(2.0 * max(n - 1, 1)))}
         for group, tau in model.variances.scatter.items()
     }
+
+
+def _errors(d: Diagnosis) -> list[dict[str, Any]]:
+    """The same as ``error`` of each quantity that was read beside the first."""
+    return [
+        {
+            "quantity": other.name,
+            **{
+                when: dict(zip(("fit", "holdout"), getattr(other, when), strict=True))
+                for when in ("before", "after", "best")
+            },
+            "noise": other.noise,
+        }
+        for other in d.others
+    ]
 
 
 def _numbered(
@@ -268,7 +285,7 @@ def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
         "effects": forms,
         "parameters": model.values,
         "std": _std(d, model),
-        "error_fit": model.rms(d.baseline.used),
+        "error_fit": model.rms(d.baseline.used & d.experiment.readings.first),
         "error_holdout": holdout,
         "converged": model.converged,
     }

@@ -37,7 +37,10 @@ MANY = 4000  # readings above which their markers are drawn as pixels
 
 def quantity_label(quantity: str) -> str:
     """What is compared, with its unit, as on an axis."""
-    return next(kind.label for kind in KINDS if kind.quantity == quantity)
+    labels: dict[str, str] = {}
+    for kind in KINDS:
+        labels |= {kind.quantity: kind.label} | dict(kind.besides)
+    return labels[quantity]
 
 
 def shown_model(diagnosis: Diagnosis) -> tuple[Fit, str] | None:
@@ -57,9 +60,9 @@ def blank(height: float) -> Figure:
 
 
 def run_panels(
-    diagnosis: Diagnosis, names: Sequence[str], height: float, ylabel: str
+    diagnosis: Diagnosis, names: Sequence[str], height: float, ylabel: str, first: int = 0
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with a panel for each run against its first covariate, named."""
+    """A figure with a panel for each run from one on against its first covariate, named."""
     readings, count = diagnosis.experiment.readings, len(names)
     columns = 2 if count in (2, 4) else min(count, 3)
     rows = -(-count // columns)
@@ -77,7 +80,7 @@ def run_panels(
             # The lowest panel that is shown in a column.
             axes.set_xlabel(next(iter(readings.covariates)))
             axes.tick_params(labelbottom=True)
-        held = bool(readings.holdout[readings.run == number].any())
+        held = bool(readings.holdout[readings.run == first + number].any())
         axes.set_title(
             f"{name}, held out" if held else name,
             color=HELD_OUT if held else INK,

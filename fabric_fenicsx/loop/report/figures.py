@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..inference.diagnosis import Diagnosis
+from ..inference.experiment import Another
 from ..inference.fitting import Fit
 from ..kinds import kind_of
 from .content import nearest_model
@@ -39,7 +40,7 @@ LAW_AXES = {"curvature_1_mm": "curvature [1/mm]", "moment_N": "moment per width 
 CURVE_AXES = {"shear_angle_rad": "shear angle [rad]", "moment_N": "shear moment per area [N]"}
 
 
-def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
+def data_figure(diagnosis: Diagnosis, names: Sequence[str], other: Another | None = None) -> Figure:
     """Readings with the fitted baseline and the reported model, a panel for each run.
 
     The band is what the model expects of a reading, twice its standard error and the noise
@@ -48,19 +49,21 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
     Args:
         diagnosis: what was found.
         names: of the runs.
+        other: the quantity that is shown, whose runs these are; by default the first.
     """
     readings = diagnosis.experiment.readings
     along = next(iter(readings.covariates.values()))
-    figure, panels = run_panels(
-        diagnosis, names, 2.7, quantity_label(diagnosis.experiment.quantity)
-    )
+    name, unit, begin = diagnosis.experiment.quantity, 1.0, 0
+    if other is not None:
+        name, unit, begin = other.name, other.unit, int(readings.run[other.rows].min())
+    figure, panels = run_panels(diagnosis, names, 2.7, quantity_label(name), begin)
     model = shown_model(diagnosis)
     expecting = nearest_model(diagnosis)
     band = 2.0 * reading_std(expecting)
     # Readings all over a sheet are on no line.
     scattered = kind_of(diagnosis.experiment.test).scattered
     compared = readings.usable & ~diagnosis.outliers
-    for number, axes in enumerate(panels):
+    for number, axes in enumerate(panels, start=begin):
         own = np.flatnonzero(readings.run == number)
         for kind, flags in (("reading", compared), ("left out", ~compared)):
             at = own[flags[own]]
@@ -70,7 +73,7 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
             size = 9 if kind == "reading" else 14
             axes.scatter(
                 along[at],
-                readings.observed[at],
+                readings.observed[at] / unit,
                 s=size,
                 label=kind if len(at) else None,
                 rasterized=len(readings.run) > MANY,
@@ -86,15 +89,15 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
             else:
                 axes.fill_between(
                     along[part],
-                    expecting.expected[part] - band[part],
-                    expecting.expected[part] + band[part],
+                    (expecting.expected[part] - band[part]) / unit,
+                    (expecting.expected[part] + band[part]) / unit,
                     color=FAINT,
                     linewidth=0,
                     label="± 2 σ of a reading, foretold" if first else None,
                 )
             axes.plot(
                 along[part],
-                diagnosis.baseline.expected[part],
+                diagnosis.baseline.expected[part] / unit,
                 color=BEFORE,
                 label="baseline" if first else None,
                 **curve,
@@ -103,7 +106,7 @@ def data_figure(diagnosis: Diagnosis, names: Sequence[str]) -> Figure:
                 fit, text = model
                 axes.plot(
                     along[part],
-                    fit.expected[part],
+                    fit.expected[part] / unit,
                     color=AFTER,
                     linewidth=1.0,
                     label=text if first else None,
@@ -127,7 +130,7 @@ def candidates_figure(diagnosis: Diagnosis) -> Figure | None:
     tried = [c for c in diagnosis.candidates if c.fit is not None]
     if not tried:
         return None
-    rows = diagnosis.baseline.used
+    rows = diagnosis.baseline.used & diagnosis.experiment.readings.first
     tried.sort(key=lambda c: c.fit.rms(rows) if c.fit else np.inf, reverse=True)
     figure = blank(0.8 + 0.32 * (len(tried) + 1))
     axes = figure.subplots()

@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from markupsafe import Markup
 from matplotlib.figure import Figure
@@ -20,7 +21,7 @@ from ...output.page import inline, number, rendered, save_figure
 from ..inference.diagnosis import Diagnosis
 from .discovered import Discovered
 from .discovered_figures import discovered_figure
-from .drawing import shown_model
+from .drawing import quantity_label, shown_model
 from .effect_file import effect_file
 from .figures import candidates_figure, curve_figure, data_figure, law_figure
 from .law_table import curve_table, law_table
@@ -87,6 +88,10 @@ def _write_page(folder: Path, parts: Sequence[Part]) -> None:
                     name: {"source": inline(figure, name), "caption": caption}
                     for name, (figure, caption) in figures.items()
                 },
+                "others": [
+                    {**error, "unit": parameter_unit(error["quantity"])}
+                    for error in report.get("errors", [])[1:]
+                ],
                 "added": None if model is None else model[1],
                 "rows": _candidate_rows(report),
                 "parameters": _parameter_rows(report),
@@ -155,6 +160,13 @@ def _figures(
             curve_figure(diagnosis),
             "What the readings know: one curve, with no formula presumed, and twice its standard "
             "error.",
+        )
+    readings = diagnosis.experiment.readings
+    for other in readings.others:
+        own = [readings.names[run] for run in np.unique(readings.run[other.rows])]
+        made[other.name] = (
+            data_figure(diagnosis, own, other),
+            f"The same of {quantity_label(other.name)}, fitted with it.",
         )
     return {name: (figure, words) for name, (figure, words) in made.items() if figure is not None}
 

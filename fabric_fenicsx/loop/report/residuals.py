@@ -98,7 +98,7 @@ def residual_figure(diagnosis: Diagnosis, names: Sequence[str] | None = None) ->
 def residual_points(axes: Axes, diagnosis: Diagnosis, model: Fit, along: Array) -> None:
     """What a model leaves of all runs against something, with the band of the noise."""
     readings = diagnosis.experiment.readings
-    shown = readings.usable & ~diagnosis.outliers
+    shown = readings.usable & ~diagnosis.outliers & readings.first
     band = 2.0 * diagnosis.noise
     if np.isfinite(band):
         axes.axhspan(-band, band, color=FAINT, linewidth=0, label="± 2 noise")

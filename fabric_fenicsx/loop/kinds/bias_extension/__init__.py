@@ -56,7 +56,7 @@ BIAS_EXTENSION = Kind(
         Column("shear_angle_deg", optional=True, may_be_empty=True),
     ),
     fewest=4,
-    besides=("shear_angle_deg",),
+    besides={"shear_angle_deg": "shear angle of the middle [°]"},
     mistakes=_mistakes,
     experiment=called_later(f"{__name__}.model", "BiasExtension"),
 )

@@ -154,8 +154,9 @@ class BiasExtension(CrossheadTest):
         covariates: Mapping[str, Array],
         usable: Flags,
     ) -> Readings:
-        found = super()._read(measurements, observed, covariates, usable)
-        return self._together.named(found)
+        D = self._at_readings(self._points["D"].value)
+        along = {"displacement [mm]": D, **covariates}
+        return self._together.named(super()._read(measurements, observed, along, usable))
 
     @property
     def _on_the_load_cell(self) -> Array:
@@ -473,6 +474,13 @@ class BiasExtension(CrossheadTest):
             off = 100.0 * float(np.median(self._surprises))
             found.append(
                 f"That foretold the forces of the next strips to {off:.2g} % rms in the median."
+            )
+        if self._angles.any():
+            sigma, given = self._together.sigma
+            found.append(
+                f"Mean angles of the middle are fitted with the forces, as {sigma:.2g} degrees are "
+                f"{'given' if given else 'taken'} for their noise; they are the model's of all "
+                "crossings whose two tows end in no clamp."
             )
         found += [f"{key or 'pinned'}: {why}; left out." for key, why in self._failed.items()]
         return found
