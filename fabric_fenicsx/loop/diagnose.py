@@ -13,7 +13,7 @@ from mpi4py import MPI
 from ..errors import FitError, InputError, SolveError
 from ..inputs.keys import one_of
 from ..output.folder import prepare_folder
-from .fabric import fabric_content, fabric_file, write_fabric
+from .fabric import NEAREST, fabric_content, fabric_file, write_fabric
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect
 from .inference.experiment import Experiment
@@ -136,6 +136,9 @@ def diagnose(
     if folder is not None:
         progress(1.0, "drawing")
         write_fabric(folder, fabric)
+        if any(d.best is not None for d, _, _ in parts):
+            measured = _with_measurements(parts, tests)
+            write_fabric(folder, fabric_content(measured, folder, nearest=True), NEAREST)
         write_report(folder, parts, report)
     return Found(report, tuple(diagnosis for diagnosis, _, _ in parts), fabric)
 

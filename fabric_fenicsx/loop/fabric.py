@@ -29,11 +29,12 @@ from .inference.curve import Curve
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect, Variant
 from .inference.fitting import Fit
+from .kinds.bias_extension.frame_law import LIKE_THE_FRAME
 from .measurement.schema import Measurement
-from .report.content import scatter
+from .report.content import nearest_model, scatter
 from .report.plausibility import correlation_of
 
-__all__ = ["fabric_content", "fabric_file", "law_entries", "write_fabric"]
+__all__ = ["NEAREST", "fabric_content", "fabric_file", "law_entries", "write_fabric"]
 
 Array = npt.NDArray[np.float64]
 
@@ -44,6 +45,9 @@ BASELINE = {
     "C1_MPa": "tow.C1_MPa",
 }
 """Keys of what every fabric has, by the parameter that is fitted."""
+
+NEAREST = "fabric_nearest.yaml"
+"""The file with models that came nearest and are not accepted."""
 
 PLACES = {
     "picture_frame": "crossover.laws",
@@ -77,21 +81,31 @@ class _Part:
         default_factory=lambda: {"not_of_the_fabric": [], "without_a_key": []}
     )
     known: str = ""
+    of_both: bool = False
 
 
 def fabric_content(
-    tests: Sequence[tuple[Diagnosis, Sequence[Measurement]]], folder: Path
+    tests: Sequence[tuple[Diagnosis, Sequence[Measurement]]],
+    folder: Path,
+    *,
+    nearest: bool = False,
 ) -> dict[str, Any]:
     """The content of fabric.yaml.
+
+    Crossings are those of the first test that has them, or of strips in whose law a picture frame
+    has a part: theirs are of both.
 
     Args:
         tests: diagnoses of one fabric, each with the measurements that it is of.
         folder: from which the files of laws count.
+        nearest: of what is not explained take the model that came nearest, where there is one.
     """
-    parts = [_part(d, folder) for d, _ in tests]
+    parts = [_part(d, folder, nearest) for d, _ in tests]
+    with_crossings = [part for part in parts if part.crossover]
+    of_both = [part for part in with_crossings if part.of_both]
+    kept = next(iter(of_both or with_crossings), None)
     for k, part in enumerate(parts):
-        if part.crossover and any(earlier.crossover for earlier in parts[:k]):
-            # Crossings are those of the first test that has them.
+        if part.crossover and part is not kept:
             parts[k] = _Part(part.test, others=part.others, known=part.known)
     every = [m for _, measurements in tests for m in measurements]
     found = [m for d, of in tests for m in of if d.experiment.test == "cantilever"]
@@ -106,7 +120,7 @@ def fabric_content(
         },
     }
     own = {name: value for part in parts for name, value in part.tow.items()}
-    if found or stated:
+    if found or stated or own:
         tow = {name: getattr(of.tow, name) for name in ("width_mm", "height_mm", "C1_MPa")}
         if "bending_in_plane_Nmm" in of.tow.model_fields_set and of.tow.bending_in_plane_Nmm:
             tow["bending_in_plane_Nmm"] = of.tow.bending_in_plane_Nmm
@@ -139,8 +153,8 @@ def fabric_file(
     return FabricFile.model_validate(fabric_content(tests, folder), context={"base": folder})
 
 
-def write_fabric(folder: Path, content: Mapping[str, Any]) -> None:
-    """Write fabric.yaml.
+def write_fabric(folder: Path, content: Mapping[str, Any], name: str = FILE) -> None:
+    """Write fabric.yaml, or the same under another name.
 
     Raises:
         InputError: it cannot be written.
@@ -149,9 +163,9 @@ def write_fabric(folder: Path, content: Mapping[str, Any]) -> None:
         dict(content), sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
     )
     try:
-        write_text(folder / FILE, HEAD + text)
+        write_text(folder / name, HEAD.replace(FILE, name) + text)
     except OSError as error:
-        raise InputError(f"{folder}: {FILE} cannot be written ({error.strerror})") from error
+        raise InputError(f"{folder}: {name} cannot be written ({error.strerror})") from error
 
 
 def law_entries(
@@ -203,41 +217,45 @@ def _entry(law: CrossingLaw | BendingLaw, folder: Path) -> dict[str, Any]:
 # One diagnosis --------------------------------------------------------------------------------
 
 
-def _part(d: Diagnosis, folder: Path) -> _Part:
+def _part(d: Diagnosis, folder: Path, nearest: bool) -> _Part:
+    model = nearest_model(d) if nearest else d.final
+    effects = _effects(d, model)
     part = _Part(d.experiment.test)
     if d.verdict == "unexplained":
-        part.known = _known(d)
-    for effect, variant in _effects(d):
-        laws = getattr(variant, "laws", None)
+        part.known = _known(d, model)
+    part.of_both = any(variant.label == LIKE_THE_FRAME for _, variant in effects)
+    for effect, variant in effects:
+        kept = getattr(variant, "laws", None) or getattr(variant, "changes", None)
         if not effect.of_fabric:
-            part.others["not_of_the_fabric"].append(_other(d, effect, variant))
-        elif laws is None:
-            part.others["without_a_key"].append(_other(d, effect, variant))
+            part.others["not_of_the_fabric"].append(_other(d, model, effect, variant))
+        elif kept is None:
+            part.others["without_a_key"].append(_other(d, model, effect, variant))
     if part.test == "picture_frame" and d.curve is not None:
         _add_curve(part, d.curve)
     else:
-        _add_fitted(part, d.final, _effects(d), folder)
+        _add_fitted(part, model, effects, folder)
     return part
 
 
-def _effects(d: Diagnosis) -> list[tuple[Effect, Variant]]:
-    """Those of the reported model, each with its form."""
+def _effects(d: Diagnosis, model: Fit) -> list[tuple[Effect, Variant]]:
+    """Those of a model, each with its form; of the reported one the strongest first."""
+    known = d.effects if model is d.final else (*d.experiment.effects, *d.experiment.terms)
     return [
         (effect, variant)
-        for effect in d.effects
-        for variant in d.final.variants
+        for effect in known
+        for variant in model.variants
         if variant in effect.variants
     ]
 
 
-def _other(d: Diagnosis, effect: Effect, variant: Variant) -> dict[str, Any]:
+def _other(d: Diagnosis, model: Fit, effect: Effect, variant: Variant) -> dict[str, Any]:
     names = [p.name for p in variant.parameters]
     return {
         "effect": effect.name,
         "form": variant.label,
         "test": d.experiment.test,
-        "values": {name: d.final.values[name] for name in names},
-        "std": {name: _std(d.final, name) for name in names},
+        "values": {name: model.values[name] for name in names},
+        "std": {name: _std(model, name) for name in names},
     }
 
 
@@ -247,12 +265,14 @@ def _std(model: Fit, name: str) -> float | None:
     return None if name in model.at_bound or not np.isfinite(error) else float(error)
 
 
-def _known(d: Diagnosis) -> str:
-    unit = d.experiment.quantity
-    left = f"what is left of {unit} is {d.baseline.rms(d.baseline.used):.3g} rms, where a reading "
+def _known(d: Diagnosis, model: Fit) -> str:
+    unit, rows = d.experiment.quantity, model.used & d.experiment.readings.first
+    left = f"what is left of {unit} is {model.rms(rows):.3g} rms, where a reading "
     left += f"scatters by {d.noise:.3g}"
     if d.curve is not None:
         return f"the moment against the angle at one rate, as a table; with the baseline {left}"
+    if model.variants:
+        return f"the model that came nearest, which is not accepted; {left}"
     return f"the baseline's fit; {left}, and no effect of this file explains it"
 
 
@@ -269,6 +289,17 @@ def _add_fitted(
             keys[name], of[name] = {BASELINE[name]: 1.0}, ("baseline", "")
     laws: list[dict[str, Any]] = []
     for effect, variant in effects:
+        changes = getattr(variant, "changes", None)
+        if changes is not None:
+            (p,) = variant.parameters
+            value, h = model.values[p.name], 1e-4 * model.values[p.name]
+            above, below = changes(value + h), changes(value - h)
+            for place, changed in changes(value).items():
+                group, _, key = place.partition(".")
+                getattr(part, group)[key] = changed
+            slopes_of = {k: _slope(above[k], below[k], 2.0 * h) for k in above}
+            keys[p.name] = {k: slope for k, slope in slopes_of.items() if slope}
+            of[p.name] = (effect.name, variant.label)
         if not effect.of_fabric or getattr(variant, "laws", None) is None:
             continue
         entries, slopes = law_entries(variant, model.values, folder)

@@ -156,8 +156,13 @@ def build(case: BiasExtensionCase, session: Session) -> Model:
         return np.tile([0.0, crosshead(case, time), 0.0], (len(upper), 1))
 
     shares = case.strip.shares(net.points[net.crossings[:, 0]], case.spacings)
+    # Where the edges want other spacings the fabric stays what it is: limits go with the area.
+    limit, (warp, weft) = case.crossover.slip_limit_N, case.spacings
+    if limit is not None:
+        limit *= warp * weft / (case.warp_spacing_mm * case.weft_spacing_mm)
+    crossover = case.crossover.model_copy(update={"slip_limit_N": limit})
     return fabric_model(
-        case,
+        case.model_copy(update={"crossover": crossover}),
         net,
         case.spacings,
         session,

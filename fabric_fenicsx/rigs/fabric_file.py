@@ -25,6 +25,7 @@ __all__ = [
     "FILE",
     "SCHEMA",
     "FabricFile",
+    "FoundCrossoverKeys",
     "moved",
     "read_fabric",
     "resolved",
@@ -59,6 +60,7 @@ class FoundTowKeys(Keys):
     C1_MPa: Positive = Field(description="Neo-Hookean constant; E = 6 C1")
     bending_in_plane_Nmm: Positive | None = Field(None, description="as tow.stiffness of a case")
     bending: list[BendingLawKeys] = Field(default_factory=list, description="as in a case")
+    crimp_strain: NotNegative | None = Field(None, description="as in a case; null: the case's")
 
 
 class FoundCrossoverKeys(Keys):
@@ -68,6 +70,17 @@ class FoundCrossoverKeys(Keys):
     k3_N_mm: NotNegative = Field(description="as in a case")
     dashpot_N_s_mm: NotNegative = Field(description="as in a case")
     laws: list[ShearLawKeys] = Field(default_factory=list, description="as in a case")
+    slip_limit_N: Positive | None = Field(
+        None, description="as in a case, of tow_spacing_mm squared; null: the case's"
+    )
+    translation_N_mm: Positive | None = Field(None, description="likewise")
+
+    def of(self, area: float) -> dict[str, Any]:
+        """Keys of a case whose crossings are so many times as large."""
+        names = ("slip_limit_N", "translation_N_mm")
+        per_crossing = {name: getattr(self, name) for name in names}
+        given = {name: area * value for name, value in per_crossing.items() if value is not None}
+        return self.model_dump(exclude=set(per_crossing)) | given
 
 
 class TestKeys(Keys):
@@ -198,7 +211,7 @@ def with_fabric(case: AnyCase, fabric: FabricFile) -> AnyCase:
     data = case.model_dump()
     tow = data["tow"]
     if fabric.tow is not None:
-        own = fabric.tow.model_dump(exclude={"bending_in_plane_Nmm"})
+        own = fabric.tow.model_dump(exclude={"bending_in_plane_Nmm"}, exclude_none=True)
         tow |= own | {"per_width_mm": fabric.fabric.tow_spacing_mm, "D1_per_MPa": 0.0}
         if tow["bundle"] is not None:
             tow |= {"bundle": None, "section_law": "linear"}
@@ -208,7 +221,8 @@ def with_fabric(case: AnyCase, fabric: FabricFile) -> AnyCase:
             stiffness["bending_in_plane_Nmm"] = fabric.tow.bending_in_plane_Nmm
         tow["stiffness"] = stiffness if any(v is not None for v in stiffness.values()) else None
     if fabric.crossover is not None:
-        data["crossover"] |= fabric.crossover.model_dump()
+        warp, weft = case.spacings
+        data["crossover"] |= fabric.crossover.of(warp * weft / fabric.fabric.tow_spacing_mm**2)
     found = _checked(case, data)
     # The weight follows from the density of the section, whatever that is.
     ratio = fabric.fabric.areal_density_kg_m2 / areal_density(found)

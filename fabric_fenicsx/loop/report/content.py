@@ -124,6 +124,8 @@ def test_report(
         ],
         "notes": list(d.notes),
     }
+    if told := getattr(d.experiment, "foretold", None):
+        content["foretold"] = told
     if d.others:
         content["errors"] = [content["error"], *_errors(d)]
     numbers: dict[str, Any] = finite(content)

@@ -59,4 +59,5 @@ BIAS_EXTENSION = Kind(
     besides={"shear_angle_deg": "shear angle of the middle [°]"},
     mistakes=_mistakes,
     experiment=called_later(f"{__name__}.model", "BiasExtension"),
+    needs_others=True,
 )

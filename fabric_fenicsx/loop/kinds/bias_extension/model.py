@@ -25,6 +25,7 @@ from scipy.interpolate import PchipInterpolator
 
 from ....errors import SolveError
 from ....fabric.bias_strip import BiasStrip
+from ....rigs.fabric_file import FabricFile
 from ...expressions.marching import Varying
 from ...inference.effects import Effect, Variant
 from ...inference.experiment import Readings
@@ -34,6 +35,7 @@ from ..drape.shear_field import hermite_weights
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
+from .frame_law import crossing_laws, foretold, frame_moments, locking_variant
 from .quantities import read_together
 from .strip import KNOTS, Curve, StripPath, solved_strip, strip_case
 
@@ -48,8 +50,13 @@ GROUPS = 24
 ALONG = 60
 #: Share of the work by which a curve may differ from the one that a strip was solved with ...
 NEAR = 0.2
-#: ... and how often a strip is solved anew, at most, for each kind of motion.
+#: ... and by which it may once a solution has been asked for so often: then it is a fit's own.
+NEARER, PATIENCE = 0.05, 25
+#: How often a strip is solved anew, at most, for each kind of motion.
 MOST = 8
+#: Share of an amplitude by which it may be from those that strips were solved with, then, and how
+#: many of these are added.
+BETWEEN, MORE = 0.1, 3
 #: Least work of moments, over that of the first curve, that strips slip at.
 LEAST_SIZE = 1e-6
 #: k1 and k3 [N/mm] of the curve that strips are first solved with where readings tell nothing ...
@@ -113,10 +120,52 @@ class BiasExtension(CrossheadTest):
     ) -> None:
         self._solved: dict[str, list[_Solved]] = {}
         self._failed: dict[str, str] = {}
+        self._asked: dict[str, int] = {}
+        self._nodes: dict[str, list[float]] = {}
+        #: What a law that nothing was fitted of foretells; see frame_law.foretold.
+        self.foretold: dict[str, float] = {}
         self._surprises: list[float] = []
         self._together = read_together(measurements)
         self._angles, self._parent = self._together.angles, self._together.parent
         super().__init__(self._together.measurements, own, like)
+
+    def take(self, fabric: FabricFile) -> None:
+        """Take what a picture frame found, as a further form of locking, and say what it foretells.
+
+        Args:
+            fabric: what the other tests would have a case take.
+        """
+        if fabric.crossover is None:
+            return
+        gamma = np.linspace(0.0, np.radians(KNOTS[-1]), ALONG)
+        along = frame_moments(crossing_laws(fabric.crossover), gamma, self._typical_rate)
+        moments = np.interp(np.radians(KNOTS), gamma, along)
+        form = locking_variant(np.radians(KNOTS), moments)
+        if form is not None:
+            self.effects = [
+                replace(e, variants=(form, *e.variants)) if e.name == "shear_locking" else e
+                for e in self.effects
+            ]
+        try:
+            self.foretold = self._foretold(Curve.through(moments))
+        except SolveError as error:
+            self._failed["with the picture frame's law"] = str(error)
+
+    def _foretold(self, curve: Curve) -> dict[str, float]:
+        """How forces with a curve that nothing was fitted of meet what was read."""
+        solved = self._solve({}, curve)
+        D = self._points["D"].value
+        force = np.stack(
+            [
+                way.rest(D[:, r]) + self._work(way, D[:, r], curve).sum(axis=1)
+                for r, way in enumerate(solved.ways)
+            ],
+            axis=1,
+        )
+        rows = self.readings.usable & self.readings.first
+        expected, travel = (self._at_readings(values)[rows] for values in (force, D))
+        furthest = self._furthest[self.readings.run[rows]]
+        return foretold(expected, self.readings.observed[rows], travel, furthest)
 
     # Rig ----------------------------------------------------------------------------------
 
@@ -266,9 +315,12 @@ class BiasExtension(CrossheadTest):
         key = _key(changes)
         known = self._solved.get(key, [])
         apart = [self._apart(curve, one) for one in known]
-        if known and (min(apart) < NEAR or len(known) >= MOST or curve.idle):
+        asked = self._asked[key] = self._asked.get(key, 0) + 1
+        near = NEAR if asked <= PATIENCE * len(known) else NEARER
+        enough = len(known) >= MOST or key in self._failed
+        if known and (enough or curve.idle or min(apart) < near):
             return known[int(np.argmin(apart))]
-        if key in self._failed and not known:
+        if enough:
             raise SolveError(self._failed[key])
         try:
             found = self._solve(changes, curve)
@@ -325,7 +377,8 @@ class BiasExtension(CrossheadTest):
                 amplitude = amplitude * size
                 mine = Curve.through(moments.value / size.value)
             at = float(amplitude.value)
-            for node, weight, slope in zip(*hermite_weights(v.solved_at, at), strict=True):
+            nodes = self._solved_at(v, at)
+            for node, weight, slope in zip(*hermite_weights(nodes, at), strict=True):
                 part = _number(weight, {p: slope * d for p, d in amplitude.slopes.items()})
                 if node == 0.0:
                     base += part
@@ -333,6 +386,17 @@ class BiasExtension(CrossheadTest):
                     found.append(_Part(self._nearest(v.changes(node), mine), part, size))
             base += _number(-1.0)
         return [_Part(self._nearest({}, curve), base), *found]
+
+    def _solved_at(self, variant: StripPullVariant, value: float) -> list[float]:
+        """Amplitudes that strips are solved with, zero apart, among them one that is in demand."""
+        nodes = self._nodes.setdefault(variant.label, list(variant.solved_at))
+        key = f"{variant.label} between {np.searchsorted(np.sort(nodes), value)} of {len(nodes)}"
+        asked = self._asked[key] = self._asked.get(key, 0) + 1
+        away = min(abs(value - node) for node in (0.0, *nodes))
+        room = len(nodes) < len(variant.solved_at) + MORE and value < max(nodes)
+        if asked > PATIENCE and room and away > BETWEEN * value:
+            nodes.append(value)
+        return nodes
 
     def _moments(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Varying:
         """The moments of a model's laws on one way out at the speed of the runs, at KNOTS."""
@@ -474,6 +538,17 @@ class BiasExtension(CrossheadTest):
             off = 100.0 * float(np.median(self._surprises))
             found.append(
                 f"That foretold the forces of the next strips to {off:.2g} % rms in the median."
+            )
+        if self.foretold:
+            told = [f"{self.foretold['error']:.2g} N rms"]
+            told += [
+                f"{self.foretold[part]:.2g} of the force in the {words} third of the travel"
+                for part, words in (("early", "first"), ("late", "last"))
+                if part in self.foretold
+            ]
+            found.append(
+                "The law that the picture frame found, whole and with nothing fitted, foretells "
+                f"these strips, pinned, to {', '.join(told)}."
             )
         if self._angles.any():
             sigma, given = self._together.sigma

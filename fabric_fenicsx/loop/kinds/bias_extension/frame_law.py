@@ -1,0 +1,144 @@
+"""What the law of a picture frame says of a strip of the same fabric.
+
+A frame stretches its tows, a strip hardly: what the frame reads at small angles, tension and
+friction under it, need not carry over. Where yarns lock it should. With the moment m(γ) of the
+frame and the angle γ* of its least secant stiffness k = min m/γ, locking is what exceeds that,
+
+    m_lock = m − k γ    beyond γ*,
+
+of k1 γ + k3 γ³ all but the first term.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ....inputs.parameters import Parameter
+from ....mechanics.laws.dashpots import LinearDashpot
+from ....mechanics.laws.law import Crossing
+from ....mechanics.laws.springs import PolynomialSpring
+from ....mechanics.laws.tabulated import TabulatedSpring
+from ....rigs.fabric_file import FoundCrossoverKeys
+from ...expressions.marching import Marched, Varying
+from ...inference.effects import Values
+from ..crosshead import of_a_crossing, shifted
+from ..picture_frame.variant import FrameVariant
+
+__all__ = ["LIKE_THE_FRAME", "crossing_laws", "foretold", "frame_moments", "locking_variant"]
+
+Array = npt.NDArray[np.float64]
+
+FRAME_SHARE = "of_the_frame"
+#: Label of the form.
+LIKE_THE_FRAME = "as the picture frame has it"
+
+
+def crossing_laws(keys: FoundCrossoverKeys) -> tuple[Any, ...]:
+    """The laws of a crossing that stands for a unit of area."""
+    baseline = (
+        PolynomialSpring(k1=keys.k1_N_mm, k3=keys.k3_N_mm),
+        LinearDashpot(keys.dashpot_N_s_mm),
+    )
+    return (*baseline, *(law.build(1.0) for law in keys.laws))
+
+
+def frame_moments(laws: tuple[Any, ...], gamma: Array, rate: float) -> Array:
+    """Moments per area [N/mm] of laws on one way out from no shear, (n,).
+
+    Args:
+        laws: of a crossing of unit area.
+        gamma: angles [rad], increasing from 0, (n,).
+        rate: [rad/s].
+    """
+    marched = Marched(("gamma", "gamma_n", "rate", "per_time"), ())
+    moment: Any = 0.0
+    history: dict[str, Any] = {}
+    for k, law in enumerate(laws):
+        crossing = of_a_crossing(marched, k)
+        moment = moment + law.moment(crossing)
+        history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
+    at = gamma[:, None]
+    step = np.diff(at, axis=0, prepend=at[:1] - (at[1] - at[0]))
+    known = {
+        "gamma": Varying(at),
+        "gamma_n": Varying(shifted(at)),
+        "rate": Varying(np.full_like(at, rate)),
+        "per_time": Varying(rate / step),
+    }
+    found = marched.define({"moment": moment}, history)(known, {})["moment"].value
+    return np.broadcast_to(found, at.shape)[:, 0].copy()
+
+
+def locking(gamma: Array, moment: Array) -> Array:
+    """The part of a frame's moments that locking is, not falling, (n,)."""
+    secant = np.full_like(gamma, np.inf)
+    secant[1:] = moment[1:] / gamma[1:]
+    softest = int(np.argmin(secant))
+    part = np.where(np.arange(len(gamma)) > softest, moment - secant[softest] * gamma, 0.0)
+    return np.asarray(np.maximum.accumulate(np.maximum(part, 0.0)))
+
+
+@dataclass(frozen=True)
+class _Times(TabulatedSpring):
+    """A table's moments, so many times."""
+
+    share: Any = 1.0
+
+    def moment(self, at: Crossing) -> Any:
+        return self.share * super().moment(at)
+
+
+def locking_variant(gamma: Array, moment: Array) -> FrameVariant | None:
+    """A form of locking with a frame's own curve; None where it does not lock.
+
+    Args:
+        gamma: angles [rad], increasing from 0, (n,).
+        moment: of the frame there, per area [N/mm], (n,).
+    """
+    curve = locking(gamma, moment)
+    if not curve[-1] > 0.0:
+        return None
+    share = Parameter(
+        FRAME_SHARE,
+        (),
+        0.0,
+        amplitude=True,
+        meaning="share of what the picture frame's moment has beyond its least secant stiffness",
+    )
+    angles = tuple(gamma.tolist())
+
+    def laws(p: Values) -> tuple[Any, ...]:
+        size = p[FRAME_SHARE]
+        if isinstance(size, (int, float)):
+            return (TabulatedSpring(angles, tuple((size * curve).tolist())),)
+        return (_Times(angles, tuple(curve.tolist()), size),)
+
+    return FrameVariant(LIKE_THE_FRAME, (share,), laws=laws)
+
+
+def foretold(expected: Array, observed: Array, D: Array, furthest: Array) -> dict[str, float]:
+    """How a law that nothing was fitted of meets readings.
+
+    Args:
+        expected: forces [N], (n,).
+        observed: forces as they were read, (n,).
+        D: travel [mm] at each, (n,).
+        furthest: the largest of each reading's run [mm], (n,).
+
+    Returns:
+        ``error``: root mean square [N]; ``early`` and ``late``: mean of what is expected over that
+        of what was read in the first third of the travel and in the last.
+    """
+    early, late = D < furthest / 3.0, D > 2.0 * furthest / 3.0
+    return {
+        "error": float(np.sqrt(np.mean((expected - observed) ** 2))),
+        **{
+            name: float(expected[rows].mean() / observed[rows].mean())
+            for name, rows in (("early", early), ("late", late))
+            if rows.any()
+        },
+    }
