@@ -49,7 +49,7 @@ GROUPS = 24
 #: Points of the way on which a law with memory is followed to its curve.
 ALONG = 60
 #: Share of the work by which a curve may differ from the one that a strip was solved with ...
-NEAR = 0.2
+NEAR = 0.35
 #: ... and by which it may once a solution has been asked for so often: then it is a fit's own.
 NEARER, PATIENCE = 0.05, 25
 #: How often a strip is solved anew, at most, for each kind of motion.

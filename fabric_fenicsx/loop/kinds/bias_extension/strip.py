@@ -35,7 +35,7 @@ Array = npt.NDArray[np.float64]
 #: Angles [degrees] at which a curve is given; the last piece goes on straight.
 KNOTS = np.array([0.0, 3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 38.0, 44.0, 50.0, 56.0, 62.0, 70.0])
 #: Steps of a way out, if none fails.
-STEPS = 28
+STEPS = 18
 #: Least slope of a curve over the largest moment: nothing else holds crossings that do nothing.
 LEAST_SLOPE = 1e-3
 #: Largest moment per area [N/mm] of a curve that does nothing.
