@@ -66,6 +66,9 @@ class Linear:
         }
         return sum(values[name] * slope for name, slope in slopes.items()), slopes
 
+    def settle(self, variants, values):
+        pass
+
     def law(self, variants, values):
         return None
 

@@ -210,6 +210,14 @@ class Experiment(Protocol):
         """What all fitted readings are a function of, where the test cannot know more."""
         ...
 
+    def settle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
+        """Make predictions near a model as good as they can be, where they are approximate.
+
+        Raises:
+            SolveError: the model has no solution there.
+        """
+        ...
+
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law | None:
         """The material law of a model, where the test has one that a curve shows."""
         ...

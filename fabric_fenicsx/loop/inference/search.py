@@ -412,6 +412,8 @@ class _Search:
         for last in (False, True):
             variances = self.judge.averaged(model) if last else model.estimate.variances
             try:
+                if not last:
+                    self.experiment.settle(model.fit.variants, model.fit.values)
                 model = self._again(model, variances, CRITERIA.evaluations)
             except SolveError:
                 return model
@@ -433,6 +435,7 @@ class _Search:
     def _last(self, model: Model) -> Model:
         """A model fitted to the end; the old one where there is no solution on the way."""
         try:
+            self.experiment.settle(model.fit.variants, model.fit.values)
             return self._again(model, self.judge.averaged(model), CRITERIA.final_evaluations)
         except SolveError:
             return model

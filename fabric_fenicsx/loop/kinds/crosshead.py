@@ -222,6 +222,9 @@ class CrossheadTest:
 
     # Model --------------------------------------------------------------------------------
 
+    def settle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
+        """Nothing: predictions are what they can be; see Experiment."""
+
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """None: the moment depends on the angle, its rate and its past; see Experiment."""
 

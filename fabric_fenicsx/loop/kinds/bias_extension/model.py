@@ -37,7 +37,7 @@ from ..picture_frame.variant import FrameVariant
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
 from .frame_law import crossing_laws, foretold, frame_moments, locking_variant
 from .quantities import read_together
-from .strip import KNOTS, Curve, StripPath, solved_strip, strip_case
+from .strip import FINE_STEPS, KNOTS, STEPS, Curve, StripPath, solved_strip, strip_case
 
 __all__ = ["BiasExtension"]
 
@@ -50,13 +50,8 @@ GROUPS = 24
 ALONG = 60
 #: Share of the work by which a curve may differ from the one that a strip was solved with ...
 NEAR = 0.35
-#: ... and by which it may once a solution has been asked for so often: then it is a fit's own.
-NEARER, PATIENCE = 0.05, 25
 #: How often a strip is solved anew, at most, for each kind of motion.
 MOST = 8
-#: Share of an amplitude by which it may be from those that strips were solved with, then, and how
-#: many of these are added.
-BETWEEN, MORE = 0.1, 3
 #: Least work of moments, over that of the first curve, that strips slip at.
 LEAST_SIZE = 1e-6
 #: k1 and k3 [N/mm] of the curve that strips are first solved with where readings tell nothing ...
@@ -104,6 +99,10 @@ class _Part:
     size: Varying = field(default_factory=lambda: _number(1.0))
 
 
+#: Of each run, what force [N] and angle [rad] were off by, of the travel.
+_Correction = tuple[tuple[PchipInterpolator, PchipInterpolator], ...]
+
+
 class BiasExtension(CrossheadTest):
     """Bias extension of one fabric; see CrossheadTest."""
 
@@ -120,11 +119,11 @@ class BiasExtension(CrossheadTest):
     ) -> None:
         self._solved: dict[str, list[_Solved]] = {}
         self._failed: dict[str, str] = {}
-        self._asked: dict[str, int] = {}
-        self._nodes: dict[str, list[float]] = {}
+        self._corrections: dict[frozenset[Variant], _Correction] = {}
         #: What a law that nothing was fitted of foretells; see frame_law.foretold.
         self.foretold: dict[str, float] = {}
         self._surprises: list[float] = []
+        self._count = 0
         self._together = read_together(measurements)
         self._angles, self._parent = self._together.angles, self._together.parent
         super().__init__(self._together.measurements, own, like)
@@ -270,8 +269,8 @@ class BiasExtension(CrossheadTest):
 
     # Strips -------------------------------------------------------------------------------
 
-    def _solve(self, changes: Mapping[str, Any], curve: Curve) -> _Solved:
-        """Strips with some keys of their case and a curve.
+    def _solve(self, changes: Mapping[str, Any], curve: Curve, steps: int = STEPS) -> _Solved:
+        """Strips with some keys of their case and a curve; with few steps, kept for others near by.
 
         Raises:
             SolveError: one of them stopped before its end.
@@ -279,7 +278,7 @@ class BiasExtension(CrossheadTest):
         paths = []
         known: dict[str, StripPath] = {}
         for (m, run), travel, speed in zip(self._runs, self._furthest, self._speed, strict=True):
-            case = strip_case(m, run, float(travel), float(speed), changes)
+            case = strip_case(m, run, float(travel), float(speed), changes, steps)
             key = case.model_dump_json()
             if key not in known:
                 known[key] = solved_strip(case, curve)
@@ -303,7 +302,9 @@ class BiasExtension(CrossheadTest):
                 )
             )
         found = _Solved(curve, tuple(ways))
-        self._solved.setdefault(_key(changes), []).append(found)
+        self._count += 1
+        if steps == STEPS:
+            self._solved.setdefault(_key(changes), []).append(found)
         return found
 
     def _nearest(self, changes: Mapping[str, Any], curve: Curve) -> _Solved:
@@ -315,10 +316,8 @@ class BiasExtension(CrossheadTest):
         key = _key(changes)
         known = self._solved.get(key, [])
         apart = [self._apart(curve, one) for one in known]
-        asked = self._asked[key] = self._asked.get(key, 0) + 1
-        near = NEAR if asked <= PATIENCE * len(known) else NEARER
         enough = len(known) >= MOST or key in self._failed
-        if known and (enough or curve.idle or min(apart) < near):
+        if known and (enough or curve.idle or min(apart) < NEAR):
             return known[int(np.argmin(apart))]
         if enough:
             raise SolveError(self._failed[key])
@@ -358,6 +357,47 @@ class BiasExtension(CrossheadTest):
             size.append(force)
         return float(np.linalg.norm(np.concatenate(off)) / np.linalg.norm(np.concatenate(size)))
 
+    def settle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
+        """Solve the strips of a model that a fit ended with, all that it has at once.
+
+        From then on its forces and angles are corrected by what they were off by there: exactly
+        right at that place, their derivatives as before.
+
+        Raises:
+            SolveError: they stop before their end.
+        """
+        parts = self._mixed(variants, values)
+        changes: dict[str, Any] = {}
+        for v in variants:
+            if isinstance(v, StripPullVariant) and v.changes is not None:
+                changes |= v.changes(values[v.parameters[0].name])
+        curve = Curve.through(self._moments(variants, values).value)
+        exact = self._solve(changes, curve, FINE_STEPS)
+        off = []
+        for r, (way, furthest) in enumerate(zip(exact.ways, self._furthest, strict=True)):
+            D = np.linspace(0.0, furthest, ALONG)
+            gamma, slope = (
+                sum(float(p.weight.value) * p.solved.ways[r].gamma(D, k) for p in parts)
+                for k in (0, 1)
+            )
+            rest, middle = (
+                sum(
+                    float(p.weight.value * size.value) * getattr(p.solved.ways[r], name)(D)
+                    for p in parts
+                    for size in [p.size if name == "rest" else _number(1.0)]
+                )
+                for name in ("rest", "middle")
+            )
+            force = rest + np.sum(way.area * slope * curve(gamma), axis=1)
+            solved = way.rest(D) + self._work(way, D, curve).sum(axis=1)
+            off.append(
+                (
+                    PchipInterpolator(D, solved - force),
+                    PchipInterpolator(D, way.middle(D) - middle),
+                )
+            )
+        self._corrections[_solved_by(variants)] = tuple(off)
+
     def _mixed(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[_Part]:
         """What is known of the strips of a model, solved now where that is not enough.
 
@@ -377,8 +417,7 @@ class BiasExtension(CrossheadTest):
                 amplitude = amplitude * size
                 mine = Curve.through(moments.value / size.value)
             at = float(amplitude.value)
-            nodes = self._solved_at(v, at)
-            for node, weight, slope in zip(*hermite_weights(nodes, at), strict=True):
+            for node, weight, slope in zip(*hermite_weights(v.solved_at, at), strict=True):
                 part = _number(weight, {p: slope * d for p, d in amplitude.slopes.items()})
                 if node == 0.0:
                     base += part
@@ -386,17 +425,6 @@ class BiasExtension(CrossheadTest):
                     found.append(_Part(self._nearest(v.changes(node), mine), part, size))
             base += _number(-1.0)
         return [_Part(self._nearest({}, curve), base), *found]
-
-    def _solved_at(self, variant: StripPullVariant, value: float) -> list[float]:
-        """Amplitudes that strips are solved with, zero apart, among them one that is in demand."""
-        nodes = self._nodes.setdefault(variant.label, list(variant.solved_at))
-        key = f"{variant.label} between {np.searchsorted(np.sort(nodes), value)} of {len(nodes)}"
-        asked = self._asked[key] = self._asked.get(key, 0) + 1
-        away = min(abs(value - node) for node in (0.0, *nodes))
-        room = len(nodes) < len(variant.solved_at) + MORE and value < max(nodes)
-        if asked > PATIENCE and room and away > BETWEEN * value:
-            nodes.append(value)
-        return nodes
 
     def _moments(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Varying:
         """The moments of a model's laws on one way out at the speed of the runs, at KNOTS."""
@@ -484,12 +512,13 @@ class BiasExtension(CrossheadTest):
     ) -> Varying:
         self._mixture = self._mixed(variants, values)
         whole = super()._force(travel, variants, values)
-        found = whole + self._of_ways(travel["D"], "rest")
+        found = whole + self._of_ways(travel["D"], "rest") + self._correction(variants, travel, 0)
         if not self._angles.any():
             return found
         # Of runs of angles nothing else counts.
         degree = np.asarray(np.degrees(self._together.unit))
-        angles = self._of_ways(travel["D"], "middle") * Varying(degree)
+        middle = self._of_ways(travel["D"], "middle") + self._correction(variants, travel, 1)
+        angles = middle * Varying(degree)
         return Varying(
             np.where(self._angles, angles.value, found.value),
             {
@@ -497,6 +526,17 @@ class BiasExtension(CrossheadTest):
                 for p in found.slopes | angles.slopes
             },
         )
+
+    def _correction(self, variants: Sequence[Variant], travel: Any, which: int) -> Varying:
+        """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
+        off, D = self._corrections.get(_solved_by(variants)), travel["D"]
+        if off is None:
+            return _number(0.0)
+        at = np.clip(D.value, 0.0, self._furthest)
+        value, change = (
+            np.stack([own[which](at[:, r], k) for r, own in enumerate(off)], axis=1) for k in (0, 1)
+        )
+        return Varying(value, {p: change * slope for p, slope in D.slopes.items()})
 
     def _of_ways(self, D: Varying, name: str) -> Varying:
         """What the ways of a model's strips say, (n_points, n_runs): their rest, or the angle.
@@ -524,15 +564,17 @@ class BiasExtension(CrossheadTest):
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
         """Mean shear angle of the middle zone at every reading [degrees], (n,)."""
         self._mixture = self._mixed(variants, values)
-        return self._at_readings(np.degrees(self._of_ways(self._points["D"], "middle").value))
+        middle = self._of_ways(self._points["D"], "middle")
+        middle += self._correction(variants, self._points, 1)
+        return self._at_readings(np.degrees(middle.value))
 
     @property
     def notes(self) -> list[str]:  # type: ignore[override]
         """What a report must say of the model."""
-        count = sum(len(solved) for solved in self._solved.values())
         found = [
-            f"The strips were solved {count} times, with curves m(γ) of their crossings; in "
-            "between forces follow to first order, with the angles as they were."
+            f"The strips were solved {self._count} times, with curves m(γ) of their crossings; in "
+            "between forces follow to first order, with the angles as they were. Where fits end "
+            "they are solved as they are."
         ]
         if len(self._surprises) > 1:
             off = 100.0 * float(np.median(self._surprises))
@@ -580,6 +622,16 @@ def _reached(solved: _Solved, furthest: Array) -> Array:
 
 def _number(value: float, slopes: Mapping[str, Any] = MappingProxyType({})) -> Varying:
     return Varying(np.asarray(value), {p: np.asarray(slope) for p, slope in slopes.items()})
+
+
+def _solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:
+    """Those that the strips' motion depends on."""
+    return frozenset(
+        v
+        for v in variants
+        if isinstance(v, FrameVariant)
+        and (v.laws is not None or getattr(v, "changes", None) is not None)
+    )
 
 
 def _key(changes: Mapping[str, Any]) -> str:

@@ -34,8 +34,8 @@ Array = npt.NDArray[np.float64]
 
 #: Angles [degrees] at which a curve is given; the last piece goes on straight.
 KNOTS = np.array([0.0, 3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 38.0, 44.0, 50.0, 56.0, 62.0, 70.0])
-#: Steps of a way out, if none fails.
-STEPS = 18
+#: Steps of a way out, if none fails: where others are foretold of it, and where it is itself meant.
+STEPS, FINE_STEPS = 18, 40
 #: Least slope of a curve over the largest moment: nothing else holds crossings that do nothing.
 LEAST_SLOPE = 1e-3
 #: Largest moment per area [N/mm] of a curve that does nothing.
@@ -104,6 +104,7 @@ def strip_case(
     travel: float,
     rate: float,
     changes: Mapping[str, Any],
+    steps: int = STEPS,
 ) -> BiasExtensionCase:
     """The case of a run's way out, its crossings without a moment of their own.
 
@@ -113,6 +114,7 @@ def strip_case(
         travel: largest displacement [mm].
         rate: of the crosshead [mm/s].
         changes: other keys, by their dotted names.
+        steps: of the way, if none fails.
 
     Raises:
         InputError: there can be no such strip.
@@ -121,7 +123,7 @@ def strip_case(
     tow = tow_of(fabric, fabric.tow.C1_MPa)
     if "bending_in_plane_Nmm" in fabric.tow.model_fields_set:
         tow["stiffness"] = {"bending_in_plane_Nmm": fabric.tow.bending_in_plane_Nmm}
-    step = travel / rate / STEPS
+    step = travel / rate / steps
     keys: dict[str, Any] = {
         "test": "bias_extension",
         "length_mm": own["length_mm"],

@@ -332,6 +332,9 @@ class Cantilever:
                 slopes[name][own.rows] = change * factors.get(name, 1.0)
         return expected, slopes
 
+    def settle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
+        """Nothing: predictions are what they can be; see Experiment."""
+
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law:
         """Moment per width of the curvature beyond that unloaded, up to the largest one reached.
 

@@ -295,6 +295,9 @@ class Drape:
 
     # Model --------------------------------------------------------------------------------
 
+    def settle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
+        """Nothing: predictions are what they can be; see Experiment."""
+
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """None: angles on a sheet are on no curve; see Experiment."""
 
