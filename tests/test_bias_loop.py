@@ -1,16 +1,24 @@
 """Bias extension in the loop: forces from the way crossings go, against the net's own."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from scipy.interpolate import PchipInterpolator
 
 import fabric_fenicsx.loop.kinds.bias_extension.model as loop
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.kinds.bias_extension import BIAS_EXTENSION, BiasExtensionRig
+from fabric_fenicsx.loop.kinds.bias_extension.frame_law import (
+    LIKE_THE_FRAME,
+    locking,
+    locking_variant,
+)
 from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
+from fabric_fenicsx.loop.kinds.bias_extension.quantities import read_together
 from fabric_fenicsx.loop.kinds.bias_extension.strip import (
     KNOTS,
     Curve,
@@ -18,6 +26,8 @@ from fabric_fenicsx.loop.kinds.bias_extension.strip import (
     strip_case,
 )
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
+from fabric_fenicsx.rigs.bias_extension import BiasExtensionCase
+from fabric_fenicsx.rigs.fabric_file import FabricFile, with_fabric
 
 LENGTH, WIDTH, TRAVEL = 80.0, 40.0, 14.0
 NOTHING = Curve.through(1e-9 * np.radians(KNOTS))
@@ -45,9 +55,10 @@ def by_the_net(run, keys, curve=NOTHING):
     """Travels and forces of the finite elements with some keys of the case."""
     D = run.columns["displacement_mm"]
     speed = float(np.diff(D)[0] / np.diff(run.columns["time_s"])[0])
-    case = strip_case(measured(run), run, float(D.max()), speed, keys)
+    # Between steps a force that rises steeply is not a straight line.
+    case = strip_case(measured(run), run, float(D.max()), speed, keys, steps=56)
     path = solved_strip(case, curve)
-    return np.interp(D, path.travel, path.force), path
+    return PchipInterpolator(path.travel, path.force)(D), path
 
 
 def keys_of(values):
@@ -123,6 +134,127 @@ def test_slopes_are_differences(effect, label, monkeypatch):
         up, down = (test.predict((variant,), values | {name: values[name] + s})[0] for s in (h, -h))
         difference = (up - down) / (2.0 * h)
         assert slopes[name] == pytest.approx(difference, abs=1e-3 * np.abs(difference).max() + 1e-9)
+
+
+def test_where_a_fit_ends_the_strip_is_solved():
+    """Slip and the crossings' curve together, in forces and angles; before, slip by itself."""
+    test = BiasExtension([with_angles(measured(pulled(force=np.linspace(0.0, 20.0, 29))))])
+    (slip,) = (v for e in test.effects if e.name == "crossover_slip" for v in e.variants)
+    values = VALUES | {"slip_1_N": 2.0}
+    exact, path = by_the_net(pulled(), keys_of(VALUES) | slip.changes(2.0))
+    angle = np.degrees(np.interp(pulled().columns["displacement_mm"], path.travel, path.middle))
+    before = test.predict((slip,), values)[0][:29] - exact
+    test.settle((slip,), values)
+    found = test.predict((slip,), values)[0]
+    (other,) = test.readings.others
+    assert other.name == "shear_angle_deg"
+    # Each crossing that slips is a corner of the curve, and steps pass it at other places.
+    off = found[:29] - exact
+    assert np.linalg.norm(off) < 0.5 * np.linalg.norm(before)
+    assert np.sqrt(np.mean(off**2)) < 0.01 * exact.max()
+    assert found[other.rows] / other.unit == pytest.approx(angle[1::2], abs=0.1)
+
+
+def with_angles(measurement, every=2, sigma=0.5):
+    """The same with angles at some of the readings, of no meaning."""
+    for run in measurement.runs:
+        angle = np.full(run.count, np.nan)
+        angle[1::every] = np.linspace(2.0, 40.0, len(angle[1::every]))
+        run.columns["shear_angle_deg"] = angle
+    return replace(measurement, besides={"shear_angle_deg": sigma})
+
+
+def test_angles_are_readings_of_their_own():
+    """In newtons, so that one sigma is that of both; of their run's specimen, behind all forces."""
+    first = pulled(force=np.linspace(0.0, 9.0, 29), specimen="A")
+    second = pulled(force=np.full(29, np.nan), specimen="B", holdout=True)
+    third = pulled(force=np.linspace(0.0, 9.0, 29), specimen="A")
+    several = with_angles(measured(first, second, noise=0.02), sigma=0.4)
+    together = read_together([several, measured(third, noise=0.02)])
+    assert together.unit == pytest.approx(0.02 / 0.4)
+    assert together.parent.tolist() == [0, 1, 2, 0, 1]
+    readings = BiasExtension([several, measured(third, noise=0.02)]).readings
+    (other,) = readings.others
+    of_run = [readings.run == run for run in range(5)]
+    assert [int(own.sum()) for own in of_run] == [29, 29, 29, 14, 14]
+    # No force was read of the second strip, but its angles were; it stays held out.
+    assert not readings.usable[of_run[1]].any() and readings.usable[of_run[4]].all()
+    assert readings.holdout[of_run[4]].all() and not readings.holdout[of_run[3]].any()
+    assert np.array_equal(other.rows, of_run[3] | of_run[4])
+    assert readings.observed[of_run[3]][-1] / other.unit == pytest.approx(40.0)
+    specimens = [int(readings.specimen[own][0]) for own in of_run]
+    assert specimens[3:] == specimens[:2] and len(set(specimens[:3])) == 3
+    assert [int(readings.folder[own][0]) for own in of_run] == [0, 0, 1, 0, 0]
+
+
+def test_a_strip_without_readings_is_refused():
+    with pytest.raises(InputError, match=r"0 readings of force_N and 0 of shear_angle_deg, allow"):
+        read_together([measured(pulled(force=np.full(29, np.nan)))])
+
+
+def test_locking_is_what_exceeds_the_least_secant_stiffness():
+    gamma = np.linspace(0.0, 1.2, 60)
+    assert locking(gamma, 0.3 * gamma + 2.0 * gamma**3) == pytest.approx(2.0 * gamma**3, abs=1e-3)
+    # Friction under tension at small angles is no part of it.
+    hump = 0.05 * np.tanh(gamma / 0.02) + 0.1 * gamma + 3.0 * np.maximum(gamma - 0.6, 0.0) ** 2
+    part = locking(gamma, hump)
+    assert part[gamma < 0.5].max() == 0.0 < part[-1] < hump[-1]
+    assert locking(gamma, 0.3 * gamma).max() < 1e-12
+    assert locking_variant(gamma, np.zeros_like(gamma)) is None
+
+
+def test_a_strip_is_foretold_by_its_own_law_from_a_picture_frame():
+    """As pinned strips of that law read; its locking is then found once, as it is."""
+    values = VALUES | {"k3_N": 0.4}
+    force, _ = by_the_net(pulled(), keys_of(values))
+    test = BiasExtension([measured(pulled(force=force))])
+    found = FabricFile.model_validate(
+        {
+            "schema": "fabric/1",
+            "fabric": {"areal_density_kg_m2": 0.3, "tow_spacing_mm": 5.0},
+            "crossover": keys_of_the_file(values),
+        }
+    )
+    test.take(found)
+    assert test.foretold["error"] < 0.01 * force.max()
+    # Where the table begins as a cubic it is not quite the law.
+    assert test.foretold["early"] == pytest.approx(1.0, abs=0.05)
+    assert test.foretold["late"] == pytest.approx(1.0, abs=0.01)
+    (form,) = (v for e in test.effects if e.name == "shear_locking" for v in e.variants[:1])
+    assert form.label == LIKE_THE_FRAME
+    predicted, slopes = test.predict((form,), values | {"k3_N": 0.0, "of_the_frame": 1.0})
+    assert predicted == pytest.approx(force, abs=0.02 * force.max())
+    without, _ = test.predict((), values | {"k3_N": 0.0})
+    assert slopes["of_the_frame"] == pytest.approx(predicted - without, abs=0.1 * force.max())
+
+
+def keys_of_the_file(values):
+    return {
+        "k1_N_mm": values["k1_N"],
+        "k3_N_mm": values["k3_N"],
+        "dashpot_N_s_mm": values["c1_N_s"],
+    }
+
+
+def test_limits_of_a_fabric_go_with_the_area():
+    """Of a crossing at the file's spacing: at twice that four times as much."""
+    keys = {"k1_N_mm": 0.1, "k3_N_mm": 0.0, "dashpot_N_s_mm": 0.0, "slip_limit_N": 0.2}
+    found = FabricFile.model_validate(
+        {
+            "schema": "fabric/1",
+            "fabric": {"areal_density_kg_m2": 0.3, "tow_spacing_mm": 5.0},
+            "crossover": keys,
+        }
+    )
+    case = BiasExtensionCase(
+        test="bias_extension",
+        length_mm=100.0,
+        width_mm=30.0 * np.sqrt(2.0),
+        warp_spacing_mm=10.0,
+        weft_spacing_mm=10.0,
+    )
+    own = with_fabric(case, found)
+    assert own.crossover.slip_limit_N == pytest.approx(0.2 * 10.0**2 / 5.0**2)
 
 
 @pytest.mark.slow

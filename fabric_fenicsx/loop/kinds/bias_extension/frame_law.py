@@ -28,7 +28,14 @@ from ...inference.effects import Values
 from ..crosshead import of_a_crossing, shifted
 from ..picture_frame.variant import FrameVariant
 
-__all__ = ["LIKE_THE_FRAME", "crossing_laws", "foretold", "frame_moments", "locking_variant"]
+__all__ = [
+    "LIKE_THE_FRAME",
+    "crossing_laws",
+    "foretold",
+    "frame_moments",
+    "locking",
+    "locking_variant",
+]
 
 Array = npt.NDArray[np.float64]
 

@@ -46,6 +46,8 @@ Flags = npt.NDArray[np.bool_]
 
 #: Groups of crossings that go alike.
 GROUPS = 24
+#: Speeds of the crosshead that are told apart differ by this factor: tows are hardly viscous.
+PACE = 1.5
 #: Points of the way on which a law with memory is followed to its curve.
 ALONG = 60
 #: Share of the work by which a curve may differ from the one that a strip was solved with ...
@@ -177,18 +179,20 @@ class BiasExtension(CrossheadTest):
         out = np.argmax(D, axis=0)
         columns = np.arange(len(runs))
         speed = D.max(axis=0) / np.maximum(time[out, columns] - time[0], 1e-9)
-        # Forces and angles of a strip are of one way.
-        same = [self._parent == parent for parent in self._parent]
+        # Strips alike are solved once, as far as the furthest of them goes.
+        paces = np.round(np.log(speed) / np.log(PACE))[self._parent]
+        kinds = [(m.fabric, m.rig, run.own, n) for (m, run), n in zip(runs, paces, strict=True)]
+        same = [[other == own for other in kinds] for own in kinds]
         self._furthest = np.array([D.max(axis=0)[own].max() for own in same])
-        self._speed = speed[self._parent]
+        self._speed = PACE**paces
         self._groups: list[npt.NDArray[np.int64]] | None = None
-        for (m, run), travel, own_speed in zip(runs, self._furthest, self._speed, strict=True):
-            strip_case(m, run, float(travel), float(own_speed), {})
+        for (m, run), travel, pace in zip(runs, self._furthest, self._speed, strict=True):
+            strip_case(m, run, float(travel), float(pace), {})
         # Of the curve that laws with memory and dashpots follow, the same throughout.
         angles = [
             _strip(m, run).angle(0.5 * D) for (m, run), D in zip(runs, self._furthest, strict=True)
         ]
-        rates = 2.0 * np.array(angles) / self._furthest * self._speed
+        rates = 2.0 * np.array(angles) / self._furthest * speed[self._parent]
         self._typical_rate = float(np.nanmedian(rates))
         first = self._solve({}, self._first_curve())
         self._mixture = [_Part(first, _number(1.0))]
@@ -277,8 +281,8 @@ class BiasExtension(CrossheadTest):
         """
         paths = []
         known: dict[str, StripPath] = {}
-        for (m, run), travel, speed in zip(self._runs, self._furthest, self._speed, strict=True):
-            case = strip_case(m, run, float(travel), float(speed), changes, steps)
+        for (m, run), travel, pace in zip(self._runs, self._furthest, self._speed, strict=True):
+            case = strip_case(m, run, float(travel), float(pace), changes, steps)
             key = case.model_dump_json()
             if key not in known:
                 known[key] = solved_strip(case, curve)
