@@ -26,6 +26,7 @@ class Lines:
     """θ₁ (1 + δ₁) + θ₂ (1 + δ₂) t of some specimens, a run each; the last may be held out."""
 
     test, quantity, effects, notes, one_curve = "lines", "force_N", (), (), None
+    curves_only = False
     noise = SIGMA
     baseline = (Parameter("a_N", (1.0,)), Parameter("b_N", (1.0,)))
 

@@ -112,6 +112,8 @@ def fabric_content(
     # A stiffness belongs to the section that it was found with.
     stated = [m for m in every if "tow" in m.fabric.model_fields_set]
     of = (found or stated or every)[0].fabric
+    for part, (_, measurements) in zip(parts, tests, strict=True):
+        _at_spacing(part, (of.tow_spacing_mm / measurements[0].fabric.tow_spacing_mm) ** 2)
     content: dict[str, Any] = {
         "schema": SCHEMA,
         "fabric": {
@@ -339,6 +341,16 @@ def _add_fitted(
         shared = [name for name in group.split() if name in names]
         if shared and own_scatter["share"] > 0.0:
             part.specimens.append({"parameters": shared, "test": part.test, **own_scatter})
+
+
+def _at_spacing(part: _Part, area: float) -> None:
+    """Limits of slip of crossings that stand for so many times the area."""
+    for key in ("slip_limit_N", "translation_N_mm"):
+        if key in part.crossover:
+            part.crossover[key] *= area
+            for p in part.parameters:
+                if f"crossover.{key}" in p["keys"]:
+                    p["keys"][f"crossover.{key}"] *= area
 
 
 def _add_curve(part: _Part, curve: Curve) -> None:

@@ -206,6 +206,11 @@ class Experiment(Protocol):
         ...
 
     @property
+    def curves_only(self) -> bool:
+        """Whether each folder's fitted readings are on a curve of their own, and know no more."""
+        ...
+
+    @property
     def one_curve(self) -> OneCurve | None:
         """What all fitted readings are a function of, where the test cannot know more."""
         ...

@@ -499,8 +499,8 @@ class _Search:
     def _verdict(self, baseline: Model, chosen: Model) -> Verdict:
         if not chosen.effects:
             return "no_effect" if self.judge.explains(baseline, baseline) else "unexplained"
-        if self.experiment.one_curve is not None:
-            # Every effect can be such a curve: none is told from the others.
+        if self.experiment.curves_only:
+            # Every effect can be such curves: none is told from the others.
             return "unexplained"
         if not self.judge.explains(chosen, baseline):
             return "unexplained"

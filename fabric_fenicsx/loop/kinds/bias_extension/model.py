@@ -113,6 +113,7 @@ class BiasExtension(CrossheadTest):
     test = "bias_extension"
     listed = BIAS_EXTENSION_EFFECTS
     one_curve = None
+    curves_only = False
     terms: tuple[Effect, ...] = ()
 
     def __init__(

@@ -107,6 +107,7 @@ class Cantilever:
     quantity = "z_mm"
     notes = ()
     one_curve = None
+    curves_only = False
 
     def __init__(
         self,

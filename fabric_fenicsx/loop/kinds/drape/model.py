@@ -90,6 +90,7 @@ class Drape:
     quantity = "angle_deg"
     baseline: tuple[Parameter, ...] = ()
     one_curve = None
+    curves_only = False
     terms = ()
 
     def __init__(

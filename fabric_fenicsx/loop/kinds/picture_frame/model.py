@@ -62,14 +62,19 @@ class PictureFrame(CrossheadTest):
         }
 
     @cached_property
-    def terms(self) -> list[Effect]:
-        """Terms without a formula over what the fitted readings reached.
+    def curves_only(self) -> bool:
+        """Whether each laboratory's runs go one way at one rate; see Experiment.
 
-        None where each laboratory's runs go one way at one rate: rates differ from one to another
-        then as the laboratories do, and nothing but a curve is known.
+        Rates differ from one to another then as the laboratories do.
         """
         rows, folder = self.readings.fit, self.readings.folder
-        if all(self._steady(rows & (folder == k)) for k in np.unique(folder[rows])):
+        return all(self._steady(rows & (folder == k)) for k in np.unique(folder[rows]))
+
+    @cached_property
+    def terms(self) -> list[Effect]:
+        """Terms without a formula over what the fitted readings reached, if more than curves."""
+        rows = self.readings.fit
+        if self.curves_only:
             return []
 
         def most(values: Any) -> float:
