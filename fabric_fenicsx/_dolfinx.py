@@ -268,7 +268,9 @@ def _compiled_source(path: Path) -> Any | None:
     try:
         if not library.exists():
             builder = cffi.FFI()
-            builder.cdef(";\n".join(re.findall(r"^(?:int64_t|void) \w+\([^{]*\)", source, re.M)) + ";")
+            builder.cdef(
+                ";\n".join(re.findall(r"^(?:int64_t|void) \w+\([^{]*\)", source, re.M)) + ";"
+            )
             builder.set_source(name, source, extra_compile_args=_SOURCE_FLAGS)
             folder.mkdir(parents=True, exist_ok=True)
             # In a folder of its own and moved when it is whole: another process may do the same.

@@ -157,8 +157,12 @@ class Elimination:
         i, j = number[rows], number[columns]
         a, b = number[runs.ends].T
         corners = ((a, a), (b, b), (a, b), (b, a))
-        filled = corners[2:3] if symmetric else corners[2:]
-        V = Blocks(*(np.concatenate(part) for part in zip((i, j), *filled, strict=True)), symmetric)
+        filled = [(i, j), (a, b)] if symmetric else [(i, j), (a, b), (b, a)]
+        V = Blocks(
+            np.concatenate([k for k, _ in filled]),
+            np.concatenate([k for _, k in filled]),
+            symmetric,
+        )
         self.places = V.pairs
         self.left = np.zeros((len(V.pairs[0]), BLOCK, BLOCK))
 

@@ -266,12 +266,12 @@ class Discretisation:
         pairs = [self.node_block[self.net.cells]]
         if crossings:
             pairs.append(self.node_block[self.net.crossings])
-        return block_matrix(self.comm, np.vstack(pairs), self.owned, symmetric)
+        return block_matrix(self.comm, np.vstack(pairs), self.owned, symmetric=symmetric)
 
     def own_matrix(self, *, symmetric: bool) -> PETSc.Mat:
         """An empty matrix of what this rank assembles, on the blocks of ``own_blocks``."""
         comm = self.comm if self.comm.size == 1 else MPI.COMM_SELF
-        return block_matrix(comm, self.own_pairs, len(self.own_blocks), symmetric)
+        return block_matrix(comm, self.own_pairs, len(self.own_blocks), symmetric=symmetric)
 
     @cached_property
     def own_blocks(self) -> npt.NDArray[np.int64]:
@@ -363,7 +363,12 @@ class Discretisation:
 
 
 def block_matrix(
-    comm: MPI.Comm, pairs: npt.NDArray[Any], owned: int, symmetric: bool
+    comm: MPI.Comm,
+    pairs: npt.NDArray[Any],
+    owned: int,
+    *,
+    symmetric: bool,
+    kind: str = PETSc.Mat.Type.BAIJ,
 ) -> PETSc.Mat:
     """An empty matrix of blocks for each pair, both ways, and on the diagonal.
 
@@ -374,6 +379,7 @@ def block_matrix(
         pairs: global blocks that are coupled, at least the pairs that this rank has a row of.
         owned: blocks that this rank owns.
         symmetric: whether it is.
+        kind: PETSc's type of one that is not symmetric, BAIJ or AIJ.
     """
     n = comm.allreduce(owned)
     i, j = pairs.T
@@ -389,8 +395,11 @@ def block_matrix(
     A = PETSc.Mat().create(comm)
     A.setSizes(((owned * BLOCK, n * BLOCK),) * 2)
     A.setBlockSize(BLOCK)
-    A.setType(PETSc.Mat.Type.SBAIJ if symmetric else PETSc.Mat.Type.BAIJ)
-    A.setPreallocationNNZ((inside.astype(PETSc.IntType), outside.astype(PETSc.IntType)))
+    A.setType(PETSc.Mat.Type.SBAIJ if symmetric else kind)
+    counts = [part.astype(PETSc.IntType) for part in (inside, outside)]
+    if A.getType().endswith("qaij"):
+        counts = [np.repeat(part * BLOCK, BLOCK) for part in counts]
+    A.setPreallocationNNZ(tuple(counts))
     A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
     A.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
     if symmetric:

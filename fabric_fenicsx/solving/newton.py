@@ -119,15 +119,10 @@ class Newton:
         snes.setOptionsPrefix(prefix)
         options = PETSc.Options()
         for key, value in {
-            "pc_type": "cholesky" if symmetric else "lu",
             "snes_type": "newtonls",
             "snes_linesearch_type": "basic",
             "snes_divergence_tolerance": -1,
             "ksp_type": "preonly",
-            "pc_factor_mat_solver_type": "mumps",
-            # Orderings found best on these nets: METIS on one rank, AMF on several.
-            "mat_mumps_icntl_7": 5 if net.comm.size == 1 else 2,
-            "mat_mumps_icntl_14": 50,
         }.items():
             if not options.hasName(prefix + key):
                 options[prefix + key] = value
@@ -207,6 +202,11 @@ class Newton:
             return y
 
         return solve
+
+    @property
+    def unknowns(self) -> int:
+        """How many unknowns the matrices that were factorised have at most."""
+        return max((tangent.unknowns for tangent in self._tangents.values()), default=0)
 
     def _words(self, reason: int) -> str:
         reasons = PETSc.SNES.ConvergedReason

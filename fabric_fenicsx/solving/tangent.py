@@ -22,6 +22,7 @@ import numpy.typing as npt
 from .. import _dolfinx
 from .condensation import Elimination, Runs, inner_nodes
 from .discretisation import BLOCK, block_matrix, expand
+from .ordering import nested_dissection
 from .system import System
 
 __all__ = ["Condensed", "Whole", "fail", "tangent_of"]
@@ -61,6 +62,7 @@ class Whole:
 
     Attributes:
         matrix: the tangent, prescribed rows and columns replaced.
+        unknowns: how many the factorised matrix has.
     """
 
     def __init__(self, system: System, free: PETSc.Vec, symmetric: bool, prefix: str) -> None:
@@ -74,7 +76,8 @@ class Whole:
         # A matrix has its pattern once it has been filled.
         system.tangent(self._A)
         self.matrix = self._A.duplicate()
-        self._solver = _solver(net.comm, prefix)
+        self.unknowns = self.matrix.getSize()[0]
+        self._solver = _solver(net.comm, prefix, symmetric, **_ordering(net.comm))
 
     def assemble(self) -> None:
         """Assemble the tangent at the increment and section forces set last. Collective."""
@@ -109,6 +112,7 @@ class Condensed:
 
     Attributes:
         matrix: stands for the tangent in PETSc's solvers; it has no entries.
+        unknowns: how many the factorised matrix has.
         refused: nodes of the net that are not eliminated since their chain was found unstable.
     """
 
@@ -118,6 +122,7 @@ class Condensed:
         net = self._net = system.net
         self._system, self._symmetric, self._prefix = system, symmetric, prefix
         self._functions = functions
+        self._dissected = not symmetric and net.comm.size == 1
         shape = (net.owned * BLOCK, len(net.net.points) * BLOCK)
         self.matrix = PETSc.Mat().createAIJ((shape, shape), nnz=0, comm=net.comm)
         self.matrix.assemble()
@@ -131,6 +136,61 @@ class Condensed:
         system.tangent(self._A)
         self.refused: npt.NDArray[np.bool_] = np.zeros(len(net.net.points), dtype=bool)
         self._number()
+
+    def _number(self) -> None:
+        """Find the chains, number the nodes that stay, and make the matrix on these."""
+        disc, net = self._net, self._net.net
+        owner = _owners(disc)
+        inner = inner_nodes(disc, owner) & ~self.refused
+        runs = Runs.of(net, inner)
+        pairs = np.vstack([net.cells, net.crossings])
+        pairs = np.vstack([pairs[~inner[pairs].any(axis=1)], runs.ends])
+        # Rank by rank, in the order of the blocks.
+        by_block = np.argsort(disc.node_block)
+        left = by_block[~inner[by_block]]
+        number = np.full(len(net.points), -1)
+        number[left] = np.arange(len(left))
+        if self._dissected:
+            left = left[nested_dissection(net.points[left], number[pairs])]
+            number[left] = np.arange(len(left))
+        here = by_block[disc.own_blocks]
+        own = left[owner[left] == disc.comm.rank]
+        self._kept = disc.node_block[own] - (disc.own_blocks[0] if disc.owned else 0)
+        self._R = block_matrix(
+            disc.comm,
+            number[pairs],
+            len(own),
+            symmetric=self._symmetric,
+            kind=PETSc.Mat.Type.AIJ if self._dissected else PETSc.Mat.Type.BAIJ,
+        )
+        self._z, self._b = self._R.createVecs()
+        self._scale = self._b.duplicate()
+        self._solver = self._new_solver()
+        self.unknowns = len(left) * BLOCK
+
+        self._runs = runs.only(owner[runs.ends[:, 0]] == disc.comm.rank)
+        place = np.full(len(net.points), -1)
+        place[here] = np.arange(len(here))
+        starts, columns = self._A.getRowIJ(False, True)
+        rows = np.repeat(np.arange(len(here)), np.diff(starts))
+        self._elimination = Elimination(
+            self._functions,
+            self._runs.renamed(place),
+            disc.owned,
+            (rows, columns.astype(np.int64)),
+            number[here],
+            self._symmetric,
+        )
+        self._places = [part.astype(PETSc.IntType)[:, None] for part in self._elimination.places]
+
+    def _new_solver(self) -> PETSc.KSP:
+        comm, symmetric = self._net.comm, self._symmetric
+        # MUMPS takes the order as given, for LU of scalar matrices on one rank only.
+        ordering = (
+            {"pc_factor_mat_ordering_type": "natural"} if self._dissected else _ordering(comm)
+        )
+        prefix = self._prefix + "condensed_"
+        return _solver(comm, prefix, symmetric, mat_mumps_icntl_8=0, **ordering)
 
     def assemble(self) -> None:
         """Assemble the tangent at the increment and section forces set last. Collective."""
@@ -156,10 +216,13 @@ class Condensed:
             self._number()
         R, elimination = self._R, self._elimination
         R.zeroEntries()
-        R.setValuesBlockedRCV(
-            *self._places, elimination.left, addv=PETSc.InsertMode.ADD_VALUES
-        )
+        R.setValuesBlockedRCV(*self._places, elimination.left, addv=PETSc.InsertMode.ADD_VALUES)
         R.assemble()
+        # In place of MUMPS' own scaling, which takes longer; powers of two round nothing.
+        R.getDiagonal(self._scale)
+        size = np.abs(self._scale.array_r)
+        self._scale.array[:] = np.exp2(np.rint(-0.5 * np.log2(np.where(size > 0.0, size, 1.0))))
+        R.diagonalScale(self._scale, self._scale)
         self._solver.setOperators(R)
         self._solver.setUp()
 
@@ -169,7 +232,9 @@ class Condensed:
         nodes = g.reshape(-1, BLOCK)
         self._elimination.forward(g)
         self._b.array[:] = nodes[self._kept].ravel()
+        self._b.pointwiseMult(self._b, self._scale)
         self._solver.solve(self._b, self._z)
+        self._z.pointwiseMult(self._z, self._scale)
         nodes[self._kept] = self._z.array_r.reshape(-1, BLOCK)
         self._elimination.backward(g)
         y.array[:] = g
@@ -177,47 +242,32 @@ class Condensed:
         if not served:
             # PETSc does not get over every error of a factor.
             self._solver.destroy()
-            self._solver = _solver(self._net.comm, self._prefix)
+            self._solver = self._new_solver()
         return served
 
-    def _number(self) -> None:
-        """Find the chains, number the nodes that stay, and make the matrix on these."""
-        disc, net = self._net, self._net.net
-        owner = _owners(disc)
-        inner = inner_nodes(disc, owner) & ~self.refused
-        runs = Runs.of(net, inner)
-        # Rank by rank, in the order of the blocks.
-        by_block = np.argsort(disc.node_block)
-        number = np.where(inner, -1, np.cumsum(~inner[by_block])[disc.node_block] - 1)
-        pairs = np.vstack([net.cells, net.crossings])
-        pairs = np.vstack([pairs[~inner[pairs].any(axis=1)], runs.ends])
-        here = by_block[disc.own_blocks]
-        self._kept = np.flatnonzero(~inner[here[: disc.owned]])
-        self._R = block_matrix(disc.comm, number[pairs], len(self._kept), self._symmetric)
-        self._z, self._b = self._R.createVecs()
-        self._solver = _solver(disc.comm, self._prefix)
 
-        self._runs = runs.only(owner[runs.ends[:, 0]] == disc.comm.rank)
-        place = np.full(len(net.points), -1)
-        place[here] = np.arange(len(here))
-        starts, columns = self._A.getRowIJ(False, True)
-        rows = np.repeat(np.arange(len(here)), np.diff(starts))
-        self._elimination = Elimination(
-            self._functions,
-            self._runs.renamed(place),
-            disc.owned,
-            (rows, columns.astype(np.int64)),
-            number[here],
-            self._symmetric,
-        )
-        self._places = [part.astype(PETSc.IntType)[:, None] for part in self._elimination.places]
-
-
-def _solver(comm: MPI.Comm, prefix: str) -> PETSc.KSP:
+def _solver(comm: MPI.Comm, prefix: str, symmetric: bool, **more: Any) -> PETSc.KSP:
+    """MUMPS, unless PETSc's options say otherwise."""
+    options = PETSc.Options()
+    for key, value in {
+        "ksp_type": "preonly",
+        "pc_type": "cholesky" if symmetric else "lu",
+        "pc_factor_mat_solver_type": "mumps",
+        # Room for pivoting.
+        "mat_mumps_icntl_14": 50,
+        **more,
+    }.items():
+        if not options.hasName(prefix + key):
+            options[prefix + key] = value
     solver = PETSc.KSP().create(comm)
     solver.setOptionsPrefix(prefix)
     solver.setFromOptions()
     return solver
+
+
+def _ordering(comm: MPI.Comm) -> dict[str, int]:
+    """MUMPS' ordering found best on these nets: on one rank METIS or, without it, PORD; else AMF."""
+    return {"mat_mumps_icntl_7": 5 if comm.size == 1 else 2}
 
 
 def _owners(disc: Any) -> npt.NDArray[np.int64]:
