@@ -27,8 +27,8 @@ from .system import System
 
 __all__ = ["Condensed", "Whole", "fail", "tangent_of"]
 
-#: Share of the nodes between crossings, and their number, from which on eliminating them pays.
-SHARE, LEAST = 0.25, 500
+#: Nodes between crossings from which on eliminating them pays.
+LEAST = 100
 
 
 def tangent_of(
@@ -46,8 +46,7 @@ def tangent_of(
     """
     disc = system.net
     inner = int(inner_nodes(disc, _owners(disc)).sum())
-    pays = inner >= max(LEAST, SHARE * len(disc.net.points))
-    if inner and PETSc.Options().getBool(prefix + "condense", pays):
+    if inner and PETSc.Options().getBool(prefix + "condense", inner >= LEAST):
         source = Path(__file__).with_name("condensation.c")
         functions = _dolfinx.compile_source(source, disc.comm)
         if functions is not None:
@@ -266,7 +265,7 @@ def _solver(comm: MPI.Comm, prefix: str, symmetric: bool, **more: Any) -> PETSc.
 
 
 def _ordering(comm: MPI.Comm) -> dict[str, int]:
-    """MUMPS' ordering found best on these nets: on one rank METIS or, without it, PORD; else AMF."""
+    """MUMPS' ordering found best on these nets: METIS (PORD without it), on several ranks AMF."""
     return {"mat_mumps_icntl_7": 5 if comm.size == 1 else 2}
 
 
