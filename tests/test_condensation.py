@@ -48,7 +48,7 @@ class Blocks:
         ones = np.ones(len(net.cells))[:, None]
         stiffness, mass = ones * SECTION.stiffness(), ones * SECTION.mass()
         self.net = Discretisation(net, stiffness, mass, comm)
-        self.symmetric, self.added = symmetric, dict(added)
+        self.symmetric, self.added, self.size = symmetric, dict(added), 1.0
 
     def tangent(self, A):
         disc = self.net
@@ -62,13 +62,21 @@ class Blocks:
             K = G @ G.T + np.eye(2 * BLOCK)
             if not self.symmetric:
                 K += np.triu(G)
-            A.setValuesBlocked(rows, rows, K, addv=PETSc.InsertMode.ADD_VALUES)
+            A.setValuesBlocked(rows, rows, self.size * K, addv=PETSc.InsertMode.ADD_VALUES)
         for node, block in self.added.items():
             at = disc.node_block[node] - disc.own_blocks[0]
             if 0 <= at < disc.owned:
                 row = np.array([disc.own_blocks[at] if whole else at], dtype=PETSc.IntType)
                 A.setValuesBlocked(row, row, block, addv=PETSc.InsertMode.ADD_VALUES)
         A.assemble()
+
+
+def right_hand_side(disc):
+    """A random one, the same on however many ranks."""
+    b = disc.vector()
+    values = np.random.default_rng(3).normal(size=(len(disc.net.points), BLOCK))
+    b.array[:] = values[disc.local_nodes[: disc.owned]].ravel()
+    return b
 
 
 def both(system, *, held=()):
@@ -88,9 +96,7 @@ def both(system, *, held=()):
         Path(tangent.__file__).with_name("condensation.c"), disc.comm
     )
     condensed = Condensed(system, free, system.symmetric, prefix, functions)
-    b, found = disc.vector(), []
-    whole_b = np.random.default_rng(3).normal(size=(len(disc.net.points), BLOCK))
-    b.array[:] = whole_b[nodes].ravel()
+    b, found = right_hand_side(disc), []
     for K in (condensed, Whole(system, free, system.symmetric, prefix)):
         x, y = disc.vector(), disc.vector()
         K.assemble()
@@ -158,6 +164,29 @@ def test_a_chain_without_stable_pivots_stays(symmetric, share, refused):
         assert set(np.flatnonzero(condensed.refused)) == (set(range(4, 9)) if refused else set())
         left = 2 * 12 + 2 * 7 + (3 if refused else 0)
         assert condensed.unknowns == BLOCK * left
+
+
+@KINDS
+def test_chains_of_one_bad_tangent_are_tried_again(symmetric):
+    """Nothing is left of a tangent that is zero, and said so; sound ones go on as before."""
+    system = Blocks(plain_net(3, 4, 4.0, 4), symmetric=symmetric, comm=MPI.COMM_SELF)
+    condensed, (x, *_) = both(system)
+    unknowns = condensed.unknowns
+    b, y = right_hand_side(system.net), system.net.vector()
+    system.size = 0.0
+    condensed.assemble()
+    condensed.factorise()
+    assert not condensed.solve(b, y)
+    assert condensed.unknowns == b.local_size
+    system.size = 1.0
+    condensed.assemble()
+    for _ in range(tangent.AGAIN + 1):
+        condensed.factorise()
+        assert condensed.solve(b, y)
+        again = system.net.gather_nodes(y.array_r.reshape(-1, BLOCK))
+        np.testing.assert_allclose(again, x, rtol=0, atol=1e-10 * np.abs(x).max())
+    assert condensed.unknowns == unknowns
+    assert not condensed.refused.any()
 
 
 def with_and_without(monkeypatch, run):

@@ -156,16 +156,16 @@ INLINE void add(const double *X, int64_t place, double *V)
     EACH(i) EACH(j) block[N * i + j] += X[N * i + j];
 }
 
-/* Square roots of the diagonal's absolute values, one for what is held: the size of each unknown. */
-void sizes(int64_t nodes, const int64_t *diagonal, const double *A, const double *free,
-           double *size)
+/* Square roots of the diagonal's absolute values at some nodes, one for what is held: the size of
+   each unknown. diagonal: place of each node's block. */
+void sizes(int64_t nodes, const int64_t *node, const int64_t *diagonal, const double *A,
+           const double *free, double *size)
 {
-  for (int64_t n = 0; n < nodes; ++n)
-    EACH(i)
-    {
-      const double f = free[N * n + i];
-      size[N * n + i] = sqrt(fabs(f * A[NN * (diagonal[n] >> 1) + (N + 1) * i]) + 1.0 - f);
-    }
+  for (int64_t k = 0; k < nodes; ++k)
+  {
+    const double *D = A + NN * (diagonal[k] >> 1), *f = free + N * node[k];
+    EACH(i) size[N * node[k] + i] = sqrt(fabs(f[i] * D[(N + 1) * i]) + 1.0 - f[i]);
+  }
 }
 
 /* V += the blocks that stay; one on the diagonal of what is held. place, target: places in A and in

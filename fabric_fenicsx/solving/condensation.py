@@ -130,7 +130,6 @@ class Elimination:
     Args:
         functions: condensation.c, compiled.
         runs: the chains, of places among this rank's nodes.
-        owned: number of the nodes that chains may consist of, the first ones.
         pattern: rows and columns of the stored blocks.
         number: of each node in the matrix that is left, -1 for those eliminated.
         symmetric: whether the matrix is.
@@ -144,7 +143,6 @@ class Elimination:
         self,
         functions: Any,
         runs: Runs,
-        owned: int,
         pattern: tuple[Integers, Integers],
         number: Integers,
         symmetric: bool,
@@ -169,8 +167,8 @@ class Elimination:
         at, first, last = runs.nodes, runs.first, runs.last
         inside = at[~first & ~last]
         count = len(inside)
-        self._diagonal = A.places(np.arange(owned), np.arange(owned))
-        self._size = np.zeros((owned, BLOCK))
+        self._diagonal = (len(at), at, A.places(at, at))
+        self._size = np.zeros((len(number), BLOCK))
         self._keep = (len(rows), A.places(rows, columns), V.places(i, j), rows, columns)
         self._chains = (len(a), runs.before, at)
         self._blocks = (
@@ -195,7 +193,7 @@ class Elimination:
         """
         unstable = np.zeros(self._chains[0], dtype=np.int8)
         self.left[:] = 0.0
-        self._call("sizes", len(self._diagonal), self._diagonal, values, free, self._size)
+        self._call("sizes", *self._diagonal, values, free, self._size)
         self._call("keep", *self._keep, values, free, self.left)
         self._call(
             "condense", *self._chains, *self._blocks, values, free, self._size, GROWTH,

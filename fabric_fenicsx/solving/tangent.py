@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from .. import _dolfinx
 from .condensation import Elimination, Runs, inner_nodes
-from .discretisation import BLOCK, block_matrix, expand
+from .discretisation import BLOCK, Discretisation, block_matrix, expand
 from .ordering import nested_dissection
 from .system import System
 
@@ -29,6 +29,10 @@ __all__ = ["Condensed", "Whole", "fail", "tangent_of"]
 
 #: Nodes between crossings from which on eliminating them pays.
 LEAST = 100
+
+#: Factorisations after which chains that were found unstable are tried again: it may have been the
+#: tangent of an iterate that was lost.
+AGAIN = 20
 
 
 def tangent_of(
@@ -76,7 +80,8 @@ class Whole:
         system.tangent(self._A)
         self.matrix = self._A.duplicate()
         self.unknowns = self.matrix.getSize()[0]
-        self._solver = _solver(net.comm, prefix, symmetric, **_ordering(net.comm))
+        self._new_solver = lambda: _solver(net.comm, prefix, symmetric, **_ordering(net.comm))
+        self._solver = self._new_solver()
 
     def assemble(self) -> None:
         """Assemble the tangent at the increment and section forces set last. Collective."""
@@ -100,7 +105,12 @@ class Whole:
     def solve(self, b: PETSc.Vec, y: PETSc.Vec) -> bool:
         """Solve for y by the last factorisation; whether it served. Collective."""
         self._solver.solve(b, y)
-        return bool(self._solver.getConvergedReason() > 0)
+        if self._solver.getConvergedReason() > 0:
+            return True
+        # PETSc does not get over every error of a factor.
+        self._solver.destroy()
+        self._solver = self._new_solver()
+        return False
 
 
 class Condensed:
@@ -112,7 +122,7 @@ class Condensed:
     Attributes:
         matrix: stands for the tangent in PETSc's solvers; it has no entries.
         unknowns: how many the factorised matrix has.
-        refused: nodes of the net that are not eliminated since their chain was found unstable.
+        refused: nodes of the net that are not eliminated, since their chain was found unstable.
     """
 
     def __init__(
@@ -134,6 +144,7 @@ class Condensed:
         # A matrix has its pattern once it has been filled.
         system.tangent(self._A)
         self.refused: npt.NDArray[np.bool_] = np.zeros(len(net.net.points), dtype=bool)
+        self._since = 0
         self._number()
 
     def _number(self) -> None:
@@ -175,7 +186,6 @@ class Condensed:
         self._elimination = Elimination(
             self._functions,
             self._runs.renamed(place),
-            disc.owned,
             (rows, columns.astype(np.int64)),
             number[here],
             self._symmetric,
@@ -206,12 +216,17 @@ class Condensed:
 
     def factorise(self) -> None:
         """Eliminate, and factorise what is left. Collective."""
+        self._since += 1
+        if self.refused.any() and self._since > AGAIN:
+            self.refused[:] = False
+            self._number()
         while True:
             unstable = self._elimination.eliminate(_stored_blocks(self._A), self._free)
             found = self._net.comm.allgather(self._runs.only(unstable).nodes)
             if not any(len(nodes) for nodes in found):
                 break
             self.refused[np.concatenate(found)] = True
+            self._since = 0
             self._number()
         R, elimination = self._R, self._elimination
         R.zeroEntries()
@@ -237,12 +252,11 @@ class Condensed:
         nodes[self._kept] = self._z.array_r.reshape(-1, BLOCK)
         self._elimination.backward(g)
         y.array[:] = g
-        served = bool(self._solver.getConvergedReason() > 0)
-        if not served:
-            # PETSc does not get over every error of a factor.
-            self._solver.destroy()
-            self._solver = self._new_solver()
-        return served
+        if self._solver.getConvergedReason() > 0:
+            return True
+        self._solver.destroy()
+        self._solver = self._new_solver()
+        return False
 
 
 def _solver(comm: MPI.Comm, prefix: str, symmetric: bool, **more: Any) -> PETSc.KSP:
@@ -269,7 +283,7 @@ def _ordering(comm: MPI.Comm) -> dict[str, int]:
     return {"mat_mumps_icntl_7": 5 if comm.size == 1 else 2}
 
 
-def _owners(disc: Any) -> npt.NDArray[np.int64]:
+def _owners(disc: Discretisation) -> npt.NDArray[np.int64]:
     """Rank that owns each node of the net, on every rank. Collective."""
     last = np.cumsum(disc.comm.allgather(disc.owned))
     return np.searchsorted(last, disc.node_block, side="right")
