@@ -21,7 +21,8 @@ from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.solving import tangent
-from fabric_fenicsx.solving.discretisation import BLOCK, Discretisation
+from fabric_fenicsx.solving.blocks import BLOCK
+from fabric_fenicsx.solving.discretisation import Discretisation
 from fabric_fenicsx.solving.tangent import Condensed, Whole, tangent_of
 
 SPEC = importlib.util.spec_from_file_location(

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fabric.net import Net
-from .discretisation import BLOCK, Discretisation
+from .blocks import BLOCK
+from .discretisation import Discretisation
 
 __all__ = ["Blocks", "Elimination", "Runs", "inner_nodes"]
 

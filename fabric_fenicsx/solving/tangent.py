@@ -20,8 +20,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
+from .blocks import BLOCK, block_matrix, expand
 from .condensation import Elimination, Runs, inner_nodes
-from .discretisation import BLOCK, Discretisation, block_matrix, expand
+from .discretisation import Discretisation
 from .ordering import nested_dissection
 from .system import System
 
