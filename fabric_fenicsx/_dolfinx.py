@@ -11,6 +11,7 @@ Offered:
     atan2: the two-argument arc tangent of UFL.
     NOT_A_NUMBER: why PETSc's Newton stops where the residual is not finite.
     compile_form: UFL to machine code, once for all ranks.
+    compile_source: a C file to functions, by the same compiler into the same cache.
     add_vector, add_matrix: a compiled form's contribution to an array or a matrix.
     cell_scalar: the integral of a compiled functional over this rank's own cells.
     cell_vertices, cell_dofs, input_nodes, input_cells: the numbering maps.
@@ -18,10 +19,20 @@ Offered:
 
 from __future__ import annotations
 
+import hashlib
+import importlib.util
 import inspect
 import logging
+import os
+import platform
+import re
+import sysconfig
+import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from functools import cache
+from io import StringIO
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -34,8 +45,10 @@ import vtkmodules.vtkCommonCore  # noqa: F401
 
 # isort: split
 import basix
+import cffi
 import dolfinx
 import dolfinx.fem.petsc
+import dolfinx.jit
 import numpy as np
 import numpy.typing as npt
 import ufl
@@ -53,6 +66,7 @@ __all__ = [
     "cell_scalar",
     "compile_form",
     "compile_seconds",
+    "compile_source",
     "constant",
     "constants_per_cell",
     "input_cells",
@@ -79,6 +93,7 @@ _C_FLAGS = (
     "-O2 -g0 -fno-math-errno -fno-trapping-math -fno-signed-zeros -fassociative-math "
     "-freciprocal-math"
 ).split()
+_SOURCE_FLAGS = ["-O3", "-g0", "-std=gnu11", "-fno-math-errno"]
 _JIT_OPTIONS = {"timeout": 600, "cffi_extra_compile_args": _C_FLAGS}
 
 # Seconds that this process has spent in the form compiler, for the run's report.
@@ -216,6 +231,59 @@ def compile_form(form: ufl.Form, comm: MPI.Comm, *, here: bool = True) -> Any:
         if here and result is None:
             result = compiled()
     return result
+
+
+def compile_source(path: Path, comm: MPI.Comm) -> Any | None:
+    """Functions of a C file, those not static, by cffi; rank 0 compiles, the others read the cache.
+
+    They take pointers, which ``ffi.from_buffer`` makes of arrays.
+
+    Args:
+        path: the C file.
+        comm: the communicator of the whole run; the call is collective over it.
+
+    Returns:
+        The cffi module, with ``lib`` and ``ffi``; None on every rank where one has no compiler or
+        cannot load what was compiled.
+    """
+    module = None
+    with _compiling():
+        for first in (True, False):
+            if first == (comm.rank == 0):
+                module = _compiled_source(path)
+            comm.barrier()
+    return module if all(comm.allgather(module is not None)) else None
+
+
+@cache
+def _compiled_source(path: Path) -> Any | None:
+    """The module of a C file, from the cache or compiled into it; None where that fails."""
+    source = path.read_text()
+    options = getattr(dolfinx.jit, "get_options", None) or dolfinx.jit.get_parameters
+    folder = Path(options()["cache_dir"])
+    suffix = str(sysconfig.get_config_var("EXT_SUFFIX"))
+    key = hashlib.sha256("\n".join([source, *_SOURCE_FLAGS, platform.machine(), suffix]).encode())
+    name = f"{path.stem}_{key.hexdigest()[:32]}"
+    library = folder / (name + suffix)
+    try:
+        if not library.exists():
+            builder = cffi.FFI()
+            builder.cdef(
+                ";\n".join(re.findall(r"^(?:int64_t|void) \w+\([^{]*\)", source, re.M)) + ";"
+            )
+            builder.set_source(name, source, extra_compile_args=_SOURCE_FLAGS)
+            folder.mkdir(parents=True, exist_ok=True)
+            # In a folder of its own and moved when it is whole: another process may do the same.
+            with tempfile.TemporaryDirectory(dir=folder) as own, redirect_stdout(StringIO()):
+                os.replace(builder.compile(tmpdir=own), library)
+        spec = importlib.util.spec_from_file_location(name, library)
+        assert spec is not None and spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+    # What cffi and distutils raise without a compiler has no common class.
+    except Exception:
+        return None
 
 
 def add_vector(array: npt.NDArray[np.float64], form: Any) -> None:

@@ -17,19 +17,16 @@ from petsc4py import PETSc
 
 import numpy as np
 import numpy.typing as npt
-from scipy import sparse
 
 from .. import _dolfinx
 from .._dolfinx import Function
 from ..fabric.crossings import reference_angle
 from ..fabric.net import Net
 from ..mechanics.fields import ConnectorFields, TowFields
+from .blocks import BLOCK, block_matrix, expand
 from .update import advance
 
 __all__ = ["BLOCK", "Discretisation"]
-
-#: Unknowns per node: three displacements, three rotations.
-BLOCK = 6
 
 #: PETSc's own copy of each communicator that nets are on, by its handle.
 _COPIES: dict[int, PETSc.Comm] = {}
@@ -262,33 +259,36 @@ class Discretisation:
 
         Release builds of PETSc drop entries outside the pattern without a word when dolfinx
         inserts them; ``crossings=False`` leaves the coupling out, for the test that they matter.
-        Blocks are found faster than single entries; a ``symmetric`` matrix keeps the upper ones.
         """
-        net = self.net
-        pairs = [self.node_block[net.cells]]
+        pairs = [self.node_block[self.net.cells]]
         if crossings:
-            pairs.append(self.node_block[net.crossings])
-        i, j = np.vstack(pairs).T
-        n = len(net.points)
-        ones = np.ones(len(i), dtype=np.int8)
-        graph = sparse.coo_matrix((ones, (i, j)), shape=(n, n)).tocsr()
-        graph = (graph + graph.T + sparse.identity(n, dtype=np.int8, format="csr")).tocsr()
-        if symmetric:
-            graph = sparse.triu(graph, format="csr")
-        first = int(self.comm.scan(self.owned)) - self.owned
-        own = graph[first : first + self.owned]
-        inside = np.diff(own[:, first : first + self.owned].indptr)
-        outside = np.diff(own.indptr) - inside
-        A = PETSc.Mat().create(self.comm)
-        A.setSizes(((self.owned * BLOCK, n * BLOCK),) * 2)
-        A.setBlockSize(BLOCK)
-        A.setType(PETSc.Mat.Type.SBAIJ if symmetric else PETSc.Mat.Type.BAIJ)
-        A.setPreallocationNNZ((inside.astype(PETSc.IntType), outside.astype(PETSc.IntType)))
-        A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
-        A.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
-        if symmetric:
-            A.setOption(PETSc.Mat.Option.IGNORE_LOWER_TRIANGULAR, True)
-        return A
+            pairs.append(self.node_block[self.net.crossings])
+        return block_matrix(self.comm, np.vstack(pairs), self.owned, symmetric=symmetric)
+
+    def own_matrix(self, *, symmetric: bool) -> PETSc.Mat:
+        """An empty matrix of what this rank assembles, on the blocks of ``own_blocks``."""
+        comm = self.comm if self.comm.size == 1 else MPI.COMM_SELF
+        return block_matrix(comm, self.own_pairs, len(self.own_blocks), symmetric=symmetric)
+
+    @cached_property
+    def own_blocks(self) -> npt.NDArray[np.int64]:
+        """Global blocks that this rank adds to: its local ones, then connectors' other ends."""
+        others = np.setdiff1d(self.connector_blocks, self.global_blocks)
+        return np.concatenate([self.global_blocks, others]).astype(np.int64)
+
+    @cached_property
+    def own_vertices(self) -> npt.NDArray[np.int64]:
+        """Places in ``own_blocks`` of the connectors' vertices, as ``connector_blocks``."""
+        order = np.argsort(self.own_blocks)
+        return order[np.searchsorted(self.own_blocks, self.connector_blocks, sorter=order)]
+
+    @cached_property
+    def own_pairs(self) -> npt.NDArray[np.int64]:
+        """Both ends of this rank's cells and connectors as places in ``own_blocks``, (n, 2)."""
+        pairs = [_dolfinx.cell_dofs(self.tows.space)[: len(self.owned_cells)]]
+        if self.connectors is not None:
+            pairs.append(self.own_vertices[_dolfinx.cell_dofs(self.connectors.space)])
+        return np.vstack(pairs)
 
     def vector(self) -> PETSc.Vec:
         """A zero vector of the unknowns."""
@@ -312,12 +312,20 @@ class Discretisation:
         x.array[:] = local[:own]
         x.setValues(self.rows[own:], local[own:], addv=PETSc.InsertMode.ADD_VALUES)
 
-    def maps(self) -> tuple[PETSc.LGMap, PETSc.LGMap]:
-        """Local-to-global maps of the tows' blocks and of the connectors' blocks."""
-        blocks = np.asarray(self.global_blocks, dtype=PETSc.IntType)
+    def maps(self, *, own: bool = False) -> tuple[PETSc.LGMap, PETSc.LGMap]:
+        """Local-to-global maps of the tows' blocks and of the connectors' blocks.
+
+        They lead into ``matrix``, or into this rank's ``own_matrix``.
+        """
+        tows: Any = self.global_blocks
+        connectors: Any = self.connector_blocks
+        if own:
+            tows = np.arange(len(tows))
+            connectors = self.own_vertices
+        comm = MPI.COMM_SELF if own else self.comm
         return (
-            PETSc.LGMap().create(blocks, bsize=BLOCK, comm=self.comm),
-            PETSc.LGMap().create(self.connector_blocks, bsize=BLOCK, comm=self.comm),
+            PETSc.LGMap().create(tows.astype(PETSc.IntType), bsize=BLOCK, comm=comm),
+            PETSc.LGMap().create(connectors.astype(PETSc.IntType), bsize=BLOCK, comm=comm),
         )
 
     def gather_nodes(self, local: Array) -> Array:
@@ -349,12 +357,6 @@ class Discretisation:
         update(self.tows)
         if self.connectors is not None:
             update(self.connectors)
-
-
-def expand(blocks: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Scalar row numbers of global blocks, in the order of the local array."""
-    rows = np.asarray(blocks)[:, None] * BLOCK + np.arange(BLOCK)
-    return rows.ravel().astype(PETSc.IntType)
 
 
 def unit(vectors: Array) -> Array:

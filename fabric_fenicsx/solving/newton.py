@@ -21,6 +21,7 @@ from .._dolfinx import NOT_A_NUMBER
 from ..errors import SolveError
 from .pressed import Dyad, DyadicLU
 from .system import System
+from .tangent import Condensed, Whole, tangent_of
 
 __all__ = ["Newton", "Outcome"]
 
@@ -91,8 +92,6 @@ class Newton:
         self._F, self._free, self._held = net.vector(), net.vector(), net.vector()
         first = int(net.global_blocks[0]) * 6 if net.owned else 0
         self._fixed = np.asarray(fixed, dtype=PETSc.IntType) - first
-        # A row of PETSc's triples for each.
-        self._fixed_rows = np.asarray(fixed, dtype=PETSc.IntType)[:, None]
         self._held.array[self._fixed] = 1.0
         self._free.set(1.0)
         self._free.axpy(-1.0, self._held)
@@ -103,7 +102,7 @@ class Newton:
         self._refused = self._unsettled = ""
         self._symmetric = False
         self._solvers: dict[bool, PETSc.SNES] = {}
-        self._whole: dict[bool, PETSc.Mat] = {}
+        self._tangents: dict[bool, Whole | Condensed] = {}
 
     @property
     def snes(self) -> PETSc.SNES:
@@ -120,30 +119,27 @@ class Newton:
         snes.setOptionsPrefix(prefix)
         options = PETSc.Options()
         for key, value in {
-            "pc_type": "cholesky" if symmetric else "lu",
             "snes_type": "newtonls",
             "snes_linesearch_type": "basic",
             "snes_divergence_tolerance": -1,
             "ksp_type": "preonly",
-            "pc_factor_mat_solver_type": "mumps",
-            # Orderings found best on these nets: METIS on one rank, AMF on several.
-            "mat_mumps_icntl_7": 5 if net.comm.size == 1 else 2,
-            "mat_mumps_icntl_14": 50,
         }.items():
             if not options.hasName(prefix + key):
                 options[prefix + key] = value
+        if symmetric not in self._tangents:
+            self._tangents[symmetric] = tangent_of(
+                self.system, self._free, symmetric=symmetric, prefix=prefix
+            )
+        tangent = self._tangents[symmetric]
         snes.setFunction(self._function, self._F)
-        A = self._whole[symmetric] = net.matrix(symmetric=symmetric)
-        # A matrix has its pattern once it has been filled.
-        self.system.tangent(A)
-        snes.setJacobian(self._jacobian, A.duplicate())
+        snes.setJacobian(self._jacobian, tangent.matrix)
         snes.setConvergenceTest(self._test)
         snes.setFromOptions()
         snes.setTolerances(max_it=self.limit)
-        if self._dyads:
+        if self._dyads or isinstance(tangent, Condensed):
             pc = snes.getKSP().getPC()
             pc.setType(PETSc.PC.Type.PYTHON)
-            pc.setPythonContext(DyadicLU(self._free_dyads, prefix))
+            pc.setPythonContext(DyadicLU(tangent, self._free_dyads))
         return snes
 
     def solve(self, targets: npt.NDArray[np.float64]) -> Outcome:
@@ -195,10 +191,9 @@ class Newton:
     def factorised(self) -> Callable[[PETSc.Vec], PETSc.Vec]:
         """Solves with the tangent at the increment in the fields, from right-hand sides."""
         snes = self.snes
-        P = snes.getJacobian()[1]
-        self._tangent(P)
+        self._assemble()
         solver = snes.getKSP()
-        solver.setOperators(P)
+        solver.setOperators(self._tangents[self._symmetric].matrix)
 
         def solve(b: PETSc.Vec) -> PETSc.Vec:
             right, y = b.copy(), b.duplicate()
@@ -207,6 +202,11 @@ class Newton:
             return y
 
         return solve
+
+    @property
+    def unknowns(self) -> int:
+        """How many unknowns the matrices that were factorised have at most."""
+        return max((tangent.unknowns for tangent in self._tangents.values()), default=0)
 
     def _words(self, reason: int) -> str:
         reasons = PETSc.SNES.ConvergedReason
@@ -239,7 +239,7 @@ class Newton:
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         if not self._nearly_done():
-            self._tangent(P)
+            self._assemble()
         # SNES factorises when P changes, and solves with the residual as it stands here.
         self._take_prescribed(self._F)
 
@@ -250,19 +250,8 @@ class Newton:
         before, now = self._history[-2:]
         return now**2 < ENOUGH * self.force_tolerance * before
 
-    def _tangent(self, P: PETSc.Mat) -> None:
-        """Assemble the tangent and copy it to P, with one on the diagonal for prescribed rows.
-
-        Their columns go too, so that P is symmetric; what they do is in ``_take_prescribed``.
-        """
-        A = self._whole[self._symmetric]
-        self.system.tangent(A)
-        A.copy(P, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        P.diagonalScale(self._free, self._free)
-        rows = self._fixed_rows
-        if len(rows):
-            P.setValuesRCV(rows, rows, np.ones(rows.shape))
-        P.assemble()
+    def _assemble(self) -> None:
+        self._tangents[self._symmetric].assemble()
         self.factorisations += 1
 
     def _take_prescribed(self, b: PETSc.Vec) -> None:
@@ -273,7 +262,7 @@ class Newton:
         moved, carried = self._moved, self._carried
         moved.pointwiseMult(self._held, b)
         if moved.norm(PETSc.NormType.NORM_INFINITY) > 0.0:
-            self._whole[self._symmetric].mult(moved, carried)
+            self._tangents[self._symmetric].mult(moved, carried)
             carried.pointwiseMult(carried, self._free)
             b.axpy(-1.0, carried)
 

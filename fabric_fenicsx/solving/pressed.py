@@ -25,6 +25,7 @@ from .. import _dolfinx
 from ..errors import SolveError
 from ..mechanics.fields import TowFields
 from .discretisation import Discretisation
+from .tangent import Condensed, Whole, fail
 
 __all__ = ["Dyad", "DyadicLU", "PressedTool"]
 
@@ -154,30 +155,23 @@ def _work(tows: TowFields, energy: Any, traction: Any | None, v: Any) -> Any:
 
 
 class DyadicLU:
-    """Context of a PETSc preconditioner of type python: LU of A, and dyads taken off A.
+    """Context of a PETSc preconditioner of type python: A⁻¹, and that of A with dyads taken off it.
 
     (A − c rᵀ/s)⁻¹ b = y + p (r·y)/(s − r·p) with A y = b and A p = c; with several dyads one after
     the other.
 
     Args:
+        tangent: what factorises A.
         dyads: gives (c, r, s) of each, c already zero in rows whose increment is prescribed.
-        prefix: PETSc options prefix of the factorisation.
     """
 
-    def __init__(self, dyads: Callable[[], list[Dyad]], prefix: str) -> None:
-        self._dyads, self._prefix = dyads, prefix
-        self._lu: PETSc.PC | None = None
+    def __init__(self, tangent: Whole | Condensed, dyads: Callable[[], list[Dyad]]) -> None:
+        self._tangent, self._dyads = tangent, dyads
         self._solved: list[Dyad] = []
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Factorise, and solve for every dyad's column."""
-        A, P = pc.getOperators()
-        if self._lu is None:
-            self._lu = PETSc.PC().create(pc.comm)
-            self._lu.setOptionsPrefix(self._prefix)
-        self._lu.setOperators(A, P)
-        self._lu.setFromOptions()
-        self._lu.setUp()
+        self._tangent.factorise()
         self._solved = []
         for column, row, s in self._dyads():
             p = column.duplicate()
@@ -186,7 +180,7 @@ class DyadicLU:
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
         """Y = (A − Σ dyads)⁻¹ b."""
-        assert self._lu is not None
-        self._lu.apply(b, y)
+        if not self._tangent.solve(b, y):
+            fail(pc)
         for p, row, rest in self._solved:
             y.axpy(row.dot(y) / rest, p)

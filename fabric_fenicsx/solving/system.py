@@ -74,7 +74,8 @@ class System:
         self.assemble_seconds = 0.0
         self.assemblies = {"residual": 0, "tangent": 0}
         self._local = np.zeros(len(net.rows))
-        self._lg_tows, self._lg_crossovers = net.maps()
+        # Into a matrix on all ranks and into one of this rank's own.
+        self._maps = {1: net.maps(own=True), net.comm.size: net.maps()}
         self._x = net.vector()
         connectors = PETSc.IS().createGeneral(net.connector_rows, comm=MPI.COMM_SELF)
         count = len(net.connector_rows)
@@ -159,22 +160,27 @@ class System:
         self.assemble_seconds += perf_counter() - start
 
     def tangent(self, A: PETSc.Mat) -> None:
-        """Assemble the tangent at the increment and section forces set last."""
+        """Assemble the tangent at the increment and section forces set last.
+
+        Args:
+            A: where to, a ``matrix`` of the discretisation or this rank's ``own_matrix``.
+        """
         start = perf_counter()
         self.assemblies["tangent"] += 1
         A.zeroEntries()
-        A.setLGMap(self._lg_tows, self._lg_tows)
+        tows, crossovers = self._maps[A.getComm().size]
+        A.setLGMap(tows, tows)
         _dolfinx.add_matrix(A, self._tangents["tows"])
         turning = np.flatnonzero(self.nodal_loads[: self.net.owned, 3:].any(axis=1))
         if len(turning):
             rates = self._load_work()[1]
             for block in turning:
-                rows = self.net.rows[block * BLOCK + 3 : (block + 1) * BLOCK]
-                A.setValues(rows, rows, -rates[block], addv=PETSc.InsertMode.ADD_VALUES)
+                rows = np.arange(block * BLOCK + 3, (block + 1) * BLOCK, dtype=PETSc.IntType)
+                A.setValuesLocal(rows, rows, -rates[block], addv=PETSc.InsertMode.ADD_VALUES)
         # The connectors' forms are assembled by the same kernels into the same matrix: only the
         # meaning of a local number changes.
         A.assemble(PETSc.Mat.AssemblyType.FLUSH)
-        A.setLGMap(self._lg_crossovers, self._lg_crossovers)
+        A.setLGMap(crossovers, crossovers)
         if self.net.connectors is not None:
             _dolfinx.add_matrix(A, self._tangents["crossovers"])
         A.assemble()

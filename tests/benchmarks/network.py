@@ -80,6 +80,7 @@ def run(model: Model, tolerance: float, before: Any, after: Any) -> dict[str, An
     return {
         "ranks": model.comm.size,
         "dofs": len(model.net.points) * 6,
+        "unknowns": newton.unknowns,
         "steps": stepper.number,
         "newton_iterations": newton.iterations,
         "factorisations": newton.factorisations,

@@ -1,0 +1,257 @@
+"""Nodes between crossings eliminated from the tangent: against the whole matrix, and what is left.
+
+The matrices are sums of random blocks, one for each cell and each connector of a net, the same on
+however many ranks run this.
+"""
+
+import importlib.util
+import logging
+from pathlib import Path
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import numpy as np
+import pytest
+from solve import GivenSection, plain_net
+from test_rigs import SMALL, session
+
+from fabric_fenicsx import _dolfinx
+from fabric_fenicsx.fabric.net import single_tow
+from fabric_fenicsx.rigs import drape
+from fabric_fenicsx.rigs.drape import DrapeCase
+from fabric_fenicsx.solving import tangent
+from fabric_fenicsx.solving.blocks import BLOCK
+from fabric_fenicsx.solving.discretisation import Discretisation
+from fabric_fenicsx.solving.tangent import Condensed, Whole, tangent_of
+
+SPEC = importlib.util.spec_from_file_location(
+    "network", Path(__file__).parent / "benchmarks" / "network.py"
+)
+network = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(network)
+
+SECTION = GivenSection((400.0, 150.0, 150.0, 60.0, 50.0, 90.0))
+PREFIX = {True: "test_symmetric_", False: "test_"}
+KINDS = pytest.mark.parametrize("symmetric", [True, False], ids=["symmetric", "unsymmetric"])
+
+
+class Blocks:
+    """A stand-in for a system: random blocks on a net.
+
+    Args:
+        net: the net.
+        symmetric: whether they are, and then positive definite.
+        added: to the diagonal block of nodes, by their number.
+    """
+
+    def __init__(self, net, *, symmetric, added=(), comm=MPI.COMM_WORLD):
+        ones = np.ones(len(net.cells))[:, None]
+        stiffness, mass = ones * SECTION.stiffness(), ones * SECTION.mass()
+        self.net = Discretisation(net, stiffness, mass, comm)
+        self.symmetric, self.added, self.size = symmetric, dict(added), 1.0
+
+    def tangent(self, A):
+        disc = self.net
+        A.zeroEntries()
+        whole = A.getComm().size == disc.comm.size
+        node_of = np.argsort(disc.node_block)[disc.own_blocks]
+        for pair in disc.own_pairs:
+            rows = (disc.own_blocks[pair] if whole else pair).astype(PETSc.IntType)
+            seed = node_of[pair]
+            G = np.random.default_rng(seed).normal(size=(2 * BLOCK, 2 * BLOCK))
+            K = G @ G.T + np.eye(2 * BLOCK)
+            if not self.symmetric:
+                K += np.triu(G)
+            A.setValuesBlocked(rows, rows, self.size * K, addv=PETSc.InsertMode.ADD_VALUES)
+        for node, block in self.added.items():
+            at = disc.node_block[node] - disc.own_blocks[0]
+            if 0 <= at < disc.owned:
+                row = np.array([disc.own_blocks[at] if whole else at], dtype=PETSc.IntType)
+                A.setValuesBlocked(row, row, block, addv=PETSc.InsertMode.ADD_VALUES)
+        A.assemble()
+
+
+def right_hand_side(disc):
+    """A random one, the same on however many ranks."""
+    b = disc.vector()
+    values = np.random.default_rng(3).normal(size=(len(disc.net.points), BLOCK))
+    b.array[:] = values[disc.local_nodes[: disc.owned]].ravel()
+    return b
+
+
+def both(system, *, held=()):
+    """The condensed tangent, and what it and the whole one solve and multiply to.
+
+    Args:
+        system: the blocks.
+        held: nodes of which two components are prescribed.
+    """
+    disc = system.net
+    prefix = PREFIX[system.symmetric]
+    free = disc.vector()
+    free.set(1.0)
+    nodes = disc.local_nodes[: disc.owned]
+    free.array.reshape(-1, BLOCK)[np.isin(nodes, held), 1:3] = 0.0
+    functions = _dolfinx.compile_source(
+        Path(tangent.__file__).with_name("condensation.c"), disc.comm
+    )
+    condensed = Condensed(system, free, system.symmetric, prefix, functions)
+    b, found = right_hand_side(disc), []
+    for K in (condensed, Whole(system, free, system.symmetric, prefix)):
+        x, y = disc.vector(), disc.vector()
+        K.assemble()
+        K.factorise()
+        assert K.solve(b, x)
+        K.mult(b, y)
+        found += [disc.gather_nodes(v.array_r.reshape(-1, BLOCK)) for v in (x, y)]
+    return condensed, found
+
+
+def check(found, rtol):
+    x, Ab, whole_x, whole_Ab = found
+    np.testing.assert_allclose(x, whole_x, rtol=0, atol=rtol * np.abs(whole_x).max())
+    np.testing.assert_allclose(Ab, whole_Ab, rtol=0, atol=1e-13 * np.abs(Ab).max())
+
+
+@pytest.mark.mpi
+@KINDS
+def test_condensed_and_whole_matrix_have_one_solution(symmetric):
+    # Prescribed: an inner node of a chain, a crossing, the end of a tow.
+    net = plain_net(3, 4, 4.0, 4)
+    held = [1, int(net.crossings[4, 0]), 0]
+    system = Blocks(net, symmetric=symmetric)
+    condensed, found = both(system, held=held)
+    check(found, 1e-11)
+    assert not condensed.refused.any()
+    if system.net.comm.size == 1:
+        # Two nodes at each crossing and two ends of each tow are left.
+        assert condensed.unknowns == BLOCK * (2 * 12 + 2 * 7)
+
+
+@KINDS
+def test_a_tow_alone_is_left_with_its_ends(symmetric):
+    net = single_tow(np.column_stack([np.arange(30.0), np.zeros((30, 2))]), (0.0, 0.0, 1.0))
+    condensed, found = both(Blocks(net, symmetric=symmetric), held=[0])
+    check(found, 1e-11)
+    assert condensed.unknowns == 2 * BLOCK
+
+
+@pytest.mark.mpi
+@KINDS
+@pytest.mark.parametrize(
+    ("share", "refused"), [(-1.0, True), (-1.0 + 1e-9, True), (-2.0, False)],
+    ids=["singular", "nearly singular", "indefinite"],
+)  # fmt: skip
+def test_a_chain_without_stable_pivots_stays(symmetric, share, refused):
+    """The node's own block is K + share K: nothing, next to nothing, or the negative of it.
+
+    It is the first of its chain. Its chain of three nodes is not eliminated where that would
+    make entries grow; that it is indefinite alone does not.
+    """
+    net = plain_net(3, 4, 4.0, 4)
+    node = 5
+    plain = Blocks(net, symmetric=symmetric)
+    A = plain.net.matrix()
+    plain.tangent(A)
+    row = plain.net.node_block[node] * BLOCK + np.arange(BLOCK)
+    own = np.zeros((BLOCK, BLOCK))
+    if A.getOwnershipRange()[0] <= row[0] < A.getOwnershipRange()[1]:
+        own = A.getValues(row.astype(PETSc.IntType), row.astype(PETSc.IntType))
+    block = plain.net.comm.allreduce(own)
+    condensed, found = both(Blocks(net, symmetric=symmetric, added={node: share * block}))
+    check(found, 1e-9)
+    if plain.net.comm.size == 1:
+        assert set(np.flatnonzero(condensed.refused)) == (set(range(4, 9)) if refused else set())
+        left = 2 * 12 + 2 * 7 + (3 if refused else 0)
+        assert condensed.unknowns == BLOCK * left
+
+
+@KINDS
+def test_chains_of_one_bad_tangent_are_tried_again(symmetric):
+    """Nothing is left of a tangent that is zero, and said so; sound ones go on as before."""
+    system = Blocks(plain_net(3, 4, 4.0, 4), symmetric=symmetric, comm=MPI.COMM_SELF)
+    condensed, (x, *_) = both(system)
+    unknowns = condensed.unknowns
+    b, y = right_hand_side(system.net), system.net.vector()
+    system.size = 0.0
+    condensed.assemble()
+    condensed.factorise()
+    assert not condensed.solve(b, y)
+    assert condensed.unknowns == b.local_size
+    system.size = 1.0
+    condensed.assemble()
+    for _ in range(tangent.AGAIN + 1):
+        condensed.factorise()
+        assert condensed.solve(b, y)
+        again = system.net.gather_nodes(y.array_r.reshape(-1, BLOCK))
+        np.testing.assert_allclose(again, x, rtol=0, atol=1e-10 * np.abs(x).max())
+    assert condensed.unknowns == unknowns
+    assert not condensed.refused.any()
+
+
+def with_and_without(monkeypatch, run):
+    """What a run gives with the tangents condensed, and with them whole."""
+    found = []
+    for condense in ("1", "0"):
+        options = PETSc.Options()
+        for prefix in ("fabric_", "fabric_symmetric_"):
+            options[prefix + "condense"] = condense
+        used = []
+        for kind in (Condensed, Whole):
+            plain = kind.__init__
+
+            def noted(self, *given, kind=kind, plain=plain, used=used):
+                used.append(kind)
+                plain(self, *given)
+
+            monkeypatch.setattr(kind, "__init__", noted)
+        found.append(run())
+        monkeypatch.undo()
+        assert set(used) == {Condensed if condense == "1" else Whole}
+        for prefix in ("fabric_", "fabric_symmetric_"):
+            options.delValue(prefix + "condense")
+    return found
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("problem", "result"), [("frame", "force"), ("sheet", "z_corner")])
+def test_newton_takes_the_same_iterates(monkeypatch, problem, result):
+    one, other = with_and_without(monkeypatch, lambda: getattr(network, problem)(5, 4))
+    assert one["newton_iterations"] == other["newton_iterations"]
+    assert one[result] == pytest.approx(other[result], rel=1e-9)
+    if one["ranks"] == 1:
+        assert (one["unknowns"], other["unknowns"]) == (6 * (2 * 25 + 20), one["dofs"])
+
+
+def test_a_drape_with_friction_takes_the_same_iterates(monkeypatch, tmp_path):
+    """Unsymmetric, with a pushed holder's dyad, and symmetric before anything touches."""
+    case = DrapeCase.model_validate(
+        SMALL | {"symmetry": "quarter", "contact": {"friction": 0.2}, "holder_force_N": 20,
+                 "punch_travel_mm": 4, "duration_s": 4}
+    )  # fmt: skip
+    one, other = with_and_without(monkeypatch, lambda: drape.run(case, session(tmp_path)))
+    assert one["newton_iterations"] == other["newton_iterations"]
+    for name in ("punch_force_N", "holder_height_mm", "lowest_point_mm"):
+        assert one["quantities"][name] == pytest.approx(other["quantities"][name], rel=1e-8)
+
+
+def test_without_a_compiler_the_tangent_is_whole(monkeypatch, caplog):
+    system = Blocks(plain_net(2, 2, 4.0, 4), symmetric=True, comm=MPI.COMM_SELF)
+    PETSc.Options()[PREFIX[True] + "condense"] = "1"
+    monkeypatch.setattr(_dolfinx, "compile_source", lambda path, comm: None)
+    tangent._say_once.cache_clear()
+    free = system.net.vector()
+    free.set(1.0)
+    with caplog.at_level(logging.WARNING):
+        found = [tangent_of(system, free, symmetric=True, prefix=PREFIX[True]) for _ in range(2)]
+    PETSc.Options().delValue(PREFIX[True] + "condense")
+    assert [type(K) for K in found] == [Whole, Whole]
+    assert [record.message for record in caplog.records if "compiler" in record.message] != []
+    assert len(caplog.records) == 1
+
+
+def test_a_source_that_does_not_compile_is_none(tmp_path):
+    path = tmp_path / "wrong.c"
+    path.write_text("void f(int64_t n) { this is not C }")
+    assert _dolfinx.compile_source(path, MPI.COMM_SELF) is None
