@@ -29,7 +29,6 @@ from .inference.curve import Curve
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect, Variant
 from .inference.fitting import Fit
-from .kinds.bias_extension.frame_law import LIKE_THE_FRAME
 from .measurement.schema import Measurement
 from .report.content import nearest_model, scatter
 from .report.plausibility import correlation_of
@@ -81,7 +80,7 @@ class _Part:
         default_factory=lambda: {"not_of_the_fabric": [], "without_a_key": []}
     )
     known: str = ""
-    of_both: bool = False
+    of_strips: bool = False
 
 
 def fabric_content(
@@ -92,8 +91,8 @@ def fabric_content(
 ) -> dict[str, Any]:
     """The content of fabric.yaml.
 
-    Crossings are those of the first test that has them, or of strips in whose law a picture frame
-    has a part: theirs are of both.
+    Crossings are those of the first test that has them, a picture frame, or of strips in whose
+    model there is an effect of the fabric: their tows are not stretched by a rig.
 
     Args:
         tests: diagnoses of one fabric, each with the measurements that it is of.
@@ -102,8 +101,8 @@ def fabric_content(
     """
     parts = [_part(d, folder, nearest) for d, _ in tests]
     with_crossings = [part for part in parts if part.crossover]
-    of_both = [part for part in with_crossings if part.of_both]
-    kept = next(iter(of_both or with_crossings), None)
+    of_strips = [part for part in with_crossings if part.of_strips]
+    kept = next(iter(of_strips or with_crossings), None)
     for k, part in enumerate(parts):
         if part.crossover and part is not kept:
             parts[k] = _Part(part.test, others=part.others, known=part.known)
@@ -225,7 +224,8 @@ def _part(d: Diagnosis, folder: Path, nearest: bool) -> _Part:
     part = _Part(d.experiment.test)
     if d.verdict == "unexplained":
         part.known = _known(d, model)
-    part.of_both = any(variant.label == LIKE_THE_FRAME for _, variant in effects)
+    known = any(effect.of_fabric for effect, _ in effects)
+    part.of_strips = known and part.test == "bias_extension"
     for effect, variant in effects:
         kept = getattr(variant, "laws", None) or getattr(variant, "changes", None)
         if not effect.of_fabric:
