@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
 
 from .crossings import crossings_by_tow, node_tows
 from .net import Net
@@ -114,6 +113,8 @@ def shear_at(net: Net, shear: Floats, places: Floats, *, quarter: bool) -> Float
         quarter: whether the net is the part x >= 0, y >= 0 of a sheet; places may be anywhere, and
             the angle changes its sign across either axis.
     """
+    from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
+
     flat = net.points[net.crossings].mean(axis=1)[:, :2]
     sign = np.ones(len(places))
     if quarter:

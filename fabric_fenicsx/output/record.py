@@ -105,7 +105,8 @@ class Record:
     def observe(self, step: Step, measure: Callable[[Snapshot], dict[str, float]]) -> Snapshot:
         """Write what is seen of a converged step: energies, tool forces, the ParaView files."""
         model = self.model
-        snapshot = model.snapshot(step.time)
+        outside = model.outside()
+        snapshot = model.snapshot(step.time, outside)
         row: dict[str, float] = {
             "step": step.number,
             "time_s": step.time,
@@ -113,7 +114,7 @@ class Record:
             "iterations": step.iterations,
             "failed_attempts": step.failures,
         }
-        row |= self._balance.step(step.time)
+        row |= self._balance.step(step.time, outside)
         self.gaps = model.gaps()
         for tool, gap in self.gaps.items():
             row[f"{tool}_penetration_mm"] = max(0.0, -float(gap.min()))
