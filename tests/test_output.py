@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -200,6 +201,34 @@ def test_killed_writer_leaves_a_series_that_opens_and_resumes(
     again.add(at_rest(NET, 0.6))
     assert pv.PVDReader(tmp_path / "crossings.pvd").time_values == [0.0, 0.6]
     assert len(list(tmp_path.iterdir())) == 2 + 2 * 2  # nothing unfinished stays
+
+
+def test_append_to_a_full_disk_leaves_what_was_there(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    files.append_text(path, "a,b\n")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, limits[1]))
+    try:
+        with pytest.raises(OSError, match=r"table\.csv"):
+            files.append_text(path, "1.5,2.5\n")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert path.read_text() == "a,b\n"
+    files.append_text(path, "1,2\n")
+    assert path.read_text() == "a,b\n1,2\n"
+
+
+def test_a_step_is_on_the_disk_before_it_has_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = []
+    for name in ("fsync", "replace"):
+        real = getattr(os, name)
+        monkeypatch.setattr(
+            files.os, name, lambda *given, name=name, real=real: (done.append(name), real(*given))
+        )
+    files.write_npz(tmp_path / "a.npz", {"u": np.ones(3)}, compressed=False, durable=True)
+    assert done == ["fsync", "replace"]
 
 
 def test_resume_keeps_the_steps_up_to_a_time(tmp_path: Path) -> None:
