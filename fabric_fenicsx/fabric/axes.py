@@ -108,10 +108,13 @@ def shear_at(net: Net, shear: Floats, places: Floats, *, quarter: bool) -> Float
 
     Args:
         net: the net.
-        shear: at its crossings, in any unit, (n_crossings,).
+        shear: at its crossings, in any unit, (n_crossings,), or several, (n_crossings, k).
         places: x and y on the undeformed sheet [mm], (n, 2).
         quarter: whether the net is the part x >= 0, y >= 0 of a sheet; places may be anywhere, and
             the angle changes its sign across either axis.
+
+    Returns:
+        The angle, (n,), or (n, k).
     """
     from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
 
@@ -128,7 +131,7 @@ def shear_at(net: Net, shear: Floats, places: Floats, *, quarter: bool) -> Float
         flat, shear = np.vstack([flat, *mirrored]), np.concatenate([shear, *signed])
     between = CloughTocher2DInterpolator(flat, shear)(places)
     outside = NearestNDInterpolator(flat, shear)(places)
-    return sign * np.where(np.isnan(between), outside, between)
+    return (sign * np.where(np.isnan(between), outside, between).T).T
 
 
 def _on_tow(
