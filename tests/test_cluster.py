@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -11,10 +12,10 @@ import pytest
 SCRIPTS = Path(__file__).parents[1] / "scripts" / "cluster"
 
 
-def stand_in(folder, name, script):
+def stand_in(folder, name, first="", then=""):
     """A program that notes how it was called."""
     path = folder / name
-    path.write_text(f'#!/bin/sh\necho "{name} $*" >> {folder}/called\n{script}\n')
+    path.write_text(f'#!/bin/sh\n{first}\necho "{name} $*" >> {folder}/called\n{then}\n')
     path.chmod(0o755)
 
 
@@ -33,7 +34,7 @@ def called(folder):
 
 def test_a_run_is_begun_gone_on_with_and_left_alone(place):
     folder, env = place
-    stand_in(folder / "bin", "solver", "")
+    stand_in(folder / "bin", "solver")
     steps = folder / "results" / "steps"
     steps.mkdir(parents=True)
     # Nothing, what was being written, an accepted step, the end.
@@ -50,8 +51,8 @@ def test_a_run_is_begun_gone_on_with_and_left_alone(place):
 def test_a_job_near_its_end_is_stopped_and_queued_again(place, nodes):
     folder, env = place
     for name in ("mpirun", "srun"):
-        stand_in(folder / "bin", name, "trap 'exit 130' TERM; while :; do sleep 0.05; done")
-    stand_in(folder / "bin", "scontrol", "")
+        stand_in(folder / "bin", name, "trap 'exit 130' TERM", "while :; do sleep 0.05; done")
+    stand_in(folder / "bin", "scontrol")
     job = subprocess.Popen(
         [SCRIPTS / "slurm", "case.yaml", "results"],
         cwd=folder,
@@ -64,3 +65,11 @@ def test_a_job_near_its_end_is_stopped_and_queued_again(place, nodes):
     launch = "mpirun -n 4" if nodes == 1 else "srun --mpi=pmix"
     run = f"{launch} fabric-fenicsx run case.yaml --out results"
     assert called(folder) == [run, "scontrol requeue 7"]
+
+
+def test_a_process_alone_leaves_no_setting_to_those_it_starts():
+    """The settings that make its own start short would part the ranks of another."""
+    code = "import os; b = dict(os.environ); from fabric_fenicsx.parallel import world; "
+    code += "assert world().size == 1; assert dict(os.environ) == b"
+    env = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    subprocess.run([sys.executable, "-c", code], env=env, check=True, timeout=60)
