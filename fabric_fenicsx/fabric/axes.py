@@ -117,6 +117,7 @@ def shear_at(net: Net, shear: Floats, places: Floats, *, quarter: bool) -> Float
         The angle, (n,), or (n, k).
     """
     from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
+    from scipy.spatial import Delaunay
 
     flat = net.points[net.crossings].mean(axis=1)[:, :2]
     sign = np.ones(len(places))
@@ -129,7 +130,12 @@ def shear_at(net: Net, shear: Floats, places: Floats, *, quarter: bool) -> Float
         mirrored = [flat[own] * flip for own, flip in zip(images, flips, strict=True)]
         signed = [shear[own] * np.prod(flip) for own, flip in zip(images, flips, strict=True)]
         flat, shear = np.vstack([flat, *mirrored]), np.concatenate([shear, *signed])
-    between = CloughTocher2DInterpolator(flat, shear)(places)
+    # Each by itself: the slopes are found by iteration, up to the largest change of all.
+    triangles = Delaunay(flat)
+    columns = [
+        CloughTocher2DInterpolator(triangles, c)(places) for c in shear.reshape(len(flat), -1).T
+    ]
+    between = np.column_stack(columns).reshape(len(places), *shear.shape[1:])
     outside = NearestNDInterpolator(flat, shear)(places)
     return (sign * np.where(np.isnan(between), outside, between).T).T
 
