@@ -110,4 +110,6 @@ def test_points_between_crossings():
         np.testing.assert_allclose(
             shear_at(net, shear, places * [-1.0, 1.0], quarter=True), -found, atol=1e-14
         )
+        several = shear_at(net, np.column_stack([shear, -shear]), places, quarter=True)
+        np.testing.assert_allclose(several, np.column_stack([found, -found]), atol=1e-14)
     assert np.log2(worst[0] / worst[1]) > 1.8

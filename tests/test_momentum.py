@@ -51,7 +51,7 @@ def test_momentum_rate_is_what_acts_from_outside():
     def observe(model, time):
         momentum = Momentum(model)
         rate = momentum.wrench(model.system.term_forces("inertia"))
-        outside = momentum.external()
+        outside = momentum.external(model.outside())
         np.maximum(worst, np.abs(rate - outside), out=worst)
         np.maximum(size, np.abs(outside), out=size)
         ball.append(np.linalg.norm(model.tool_forces()["ball"]))
@@ -76,7 +76,7 @@ def test_momentum_is_the_impulse():
         def observe(model, time, rows=rows, balance=balance):
             if not balance:
                 balance.append(Balance(model))
-            rows.append(balance[0].step(time))
+            rows.append(balance[0].step(time, model.outside()))
 
         swinging(0.4, step, observe)
         momentum, impulse = (

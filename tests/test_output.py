@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import resource
 from dataclasses import fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from fabric_fenicsx.fabric.net import WARP, WEFT, Net, single_tow
 from fabric_fenicsx.output import files
 from fabric_fenicsx.output.lines import COLOURS
 from fabric_fenicsx.output.paraview import TimeSeries
-from fabric_fenicsx.output.pictures import VIEWS, draw_net
+from fabric_fenicsx.output.pictures import VIEWS, aim, draw_net
 from fabric_fenicsx.output.surfaces import RevolvedSurface
 from fabric_fenicsx.solving.snapshot import Snapshot, at_rest
 
@@ -202,6 +204,34 @@ def test_killed_writer_leaves_a_series_that_opens_and_resumes(
     assert len(list(tmp_path.iterdir())) == 2 + 2 * 2  # nothing unfinished stays
 
 
+def test_append_to_a_full_disk_leaves_what_was_there(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    files.append_text(path, "a,b\n")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, limits[1]))
+    try:
+        with pytest.raises(OSError, match=r"table\.csv"):
+            files.append_text(path, "1.5,2.5\n")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert path.read_text() == "a,b\n"
+    files.append_text(path, "1,2\n")
+    assert path.read_text() == "a,b\n1,2\n"
+
+
+def test_a_step_is_on_the_disk_before_it_has_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = []
+    for name in ("fsync", "replace"):
+        real = getattr(os, name)
+        monkeypatch.setattr(
+            files.os, name, lambda *given, name=name, real=real: (done.append(name), real(*given))
+        )
+    files.write_npz(tmp_path / "a.npz", {"u": np.ones(3)}, compressed=False, durable=True)
+    assert done == ["fsync", "replace"]
+
+
 def test_resume_keeps_the_steps_up_to_a_time(tmp_path: Path) -> None:
     series = TimeSeries(tmp_path, NET)
     for time in (0.0, 0.1, 0.2, 0.3):
@@ -316,3 +346,32 @@ def test_picture_says_what_is_wrong(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="surface punch: profile has a negative radius"):
         RevolvedSurface("punch", -PROFILE, np.zeros(3))
     assert not path.exists()
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("flat", [False, True])
+def test_camera_shows_every_point_and_leaves_no_room(view: str, flat: bool) -> None:
+    """Against all points, of which the camera's search takes a few; also of a plane."""
+    extent = [100.0, 70.0, 0.0 if flat else 30.0]
+    points = np.random.default_rng(3).normal(size=(4000, 3)) * extent
+    plotter = SimpleNamespace(
+        camera=SimpleNamespace(enable_parallel_projection=lambda: None),
+        renderer=SimpleNamespace(ResetCameraClippingRange=lambda: None),
+    )
+    aim(plotter, view, [points], (1600, 1200))
+    camera = plotter.camera
+    w = np.subtract(camera.position, camera.focal_point)
+    away = np.linalg.norm(w)
+    u, v, w = np.cross(camera.up, w / away), np.array(camera.up), w / away
+    a, b, depth = ((points - camera.focal_point) @ axis for axis in (u, v, w))
+    if view == "perspective":
+        s = np.tan(np.radians(camera.view_angle) / 2.0) * (away - depth)
+    else:
+        s = camera.parallel_scale
+    p, q = a / s * 1200 / 1600, b / s
+    assert p.min() > -0.9401 and p.max() < 0.6601 and q.min() > -0.9301 and q.max() < 0.8401
+    # In one direction it is full, in the other the room is shared.
+    full = [np.ptp(p) / 1.6, np.ptp(q) / 1.77]
+    assert max(full) == pytest.approx(1.0, abs=1e-6)
+    middle = [(p.min() + p.max()) / 2.0, (q.min() + q.max()) / 2.0]
+    assert middle == pytest.approx([-0.14, -0.045], abs=1e-6)

@@ -1,11 +1,13 @@
 """The rigs as a whole: the picture frame's laws, the drape on one and two processes, the cache."""
 
 import contextlib
+import gc
 import json
 import os
 import shutil
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 from time import perf_counter
 
@@ -15,6 +17,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fabric_fenicsx.errors import SolveError
+from fabric_fenicsx.output import record
 from fabric_fenicsx.rigs import drape, picture_frame
 from fabric_fenicsx.rigs.common import Session
 from fabric_fenicsx.rigs.drape import DrapeCase
@@ -92,6 +96,37 @@ def test_energy_balance_of_a_small_drape(tmp_path):
     assert abs(last["remainder_N_mm"]) < 0.02 * last["external_work_N_mm"]
     assert last["lost_N_mm"] > 0.1 * last["external_work_N_mm"]
     assert last["kinetic_N_mm"] < 1e-4 * last["stored_N_mm"]
+
+
+def test_a_run_holds_no_more_with_every_step(tmp_path, monkeypatch):
+    """Steps are on disk as they are accepted; 1 kB a step is left for caches of the libraries.
+
+    In the median of five: what is imported or compiled once comes once.
+    """
+    held = []
+    original = record.Record.keep
+
+    def keep(self, step, stepper):
+        original(self, step, stepper)
+        if step.number == 10:
+            tracemalloc.start()
+        if step.number >= 15 and step.number % 5 == 0:
+            gc.collect()
+            held.append(tracemalloc.get_traced_memory()[0])
+        if step.number == 40:
+            raise SolveError("enough")
+
+    monkeypatch.setattr(record, "RECENT", 3, raising=False)
+    monkeypatch.setattr(record.Record, "keep", keep)
+    solver = {"first_step_s": 0.02, "largest_step_s": 0.02}
+    case = DrapeCase.model_validate(SMALL | {"solver": solver})
+    try:
+        result = drape.run(case, session(tmp_path))
+    finally:
+        tracemalloc.stop()
+    assert result["stopped_because"] == "enough"
+    assert np.median(np.diff(held)) < 5 * 1024
+    assert len(pd.read_csv(tmp_path / "steps.csv")) == len(list(tmp_path.glob("steps/*"))) == 40
 
 
 def test_quarter_and_whole_agree(tmp_path):

@@ -10,6 +10,7 @@ import time
 from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 from measurements.bad import good
 from test_cli import MPI, TINY, command, own_lines
@@ -100,6 +101,25 @@ def test_a_killed_rank_ends_all(case, tmp_path):
     process.communicate(timeout=60)
     assert process.returncode not in (0, None)
     assert not (tmp_path / "results" / "result.json").exists()
+
+
+def test_a_rank_killed_while_it_writes(case, tmp_path):
+    """No step that has its place is torn, and the run goes on from the last."""
+    folder = tmp_path / "results"
+    case.write_text(SHORT)
+    process = begun(case, folder, ranks=2)
+    children = ["pgrep", "-P", str(process.pid)]
+    ranks = subprocess.run(children, capture_output=True, text=True, check=True).stdout.split()
+    while not glob.glob(f"{folder}/**/*partial*", recursive=True):
+        assert process.poll() is None, process.stderr.read()
+    os.kill(int(ranks[0]), signal.SIGKILL)
+    process.communicate(timeout=60)
+    for path in folder.glob("steps/step_*[0-9].npz"):
+        with np.load(path) as whole:
+            assert all(whole[name].size for name in whole.files)
+    with pytest.raises(SystemExit) as ended:
+        main(["run", str(case), "--out", str(folder), "--resume", "--no-pictures", "--quiet"])
+    assert not ended.value.code
 
 
 def test_two_runs_into_one_folder(case, tmp_path):
@@ -273,4 +293,13 @@ def test_step_files_of_other_versions(tmp_path, capsys):
     last.write_bytes(original)
     code, said = run("--resume", "--set", "sheet.width_mm=144")
     assert code == 2 and "a step of another net" in said
+    # What was being written when the run was killed.
+    torn = results / "steps" / "step_00004.partial.npz"
+    torn.write_bytes(original[:5000])
+    with (results / "steps.csv").open("a") as table:
+        table.write("4,0.0")
     assert run("--resume")[0] == 0
+    assert not torn.exists()
+    rows = pd.read_csv(results / "steps.csv")
+    assert rows["step"].to_list() == list(range(1, len(rows) + 1))
+    assert np.diff(rows["time_s"]).min() > 0.0 and rows.notna().all(axis=None)

@@ -11,7 +11,7 @@ from time import monotonic, sleep
 from typing import Any
 
 from ..errors import InputError, SolveError
-from ..parallel import rank
+from ..parallel import rank, world
 
 __all__ = ["collective", "say"]
 
@@ -30,9 +30,7 @@ def collective(action: Callable[[Any], int], folder: Path | None = None) -> int:
         action: given MPI's world; its exit code is this one's.
         folder: where accepted steps are, for the line after an interrupt; None: nothing is kept.
     """
-    from mpi4py import MPI
-
-    comm = MPI.COMM_WORLD
+    comm = world()
     guard = comm.Dup()
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -77,14 +78,20 @@ def _run(
     quiet: bool,
     **options: Any,
 ) -> int:
+    from ..fabric.gmsh_io import load_gmsh
     from ..rigs.load import load_case
 
     case = from_root(comm, lambda: load_case(path, settings, fabric=fabric))
 
+    root = comm.rank == 0
+    if root:
+        # Before PETSc and VTK. Whether a case that needs it can do without is said by its mesh.
+        with suppress(ImportError, OSError):
+            load_gmsh()
+
     from ..rigs.run import run
     from ..terminal import following, summarise
 
-    root = comm.rank == 0
     if options["uncertainty"] and not quiet:
         say(from_root(comm, lambda: _cost(case, path.parent)))
     with following(quiet=quiet or not root) as progress:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
 
 from .crossings import crossings_by_tow, node_tows
 from .net import Net
@@ -109,11 +108,17 @@ def shear_at(net: Net, shear: Floats, places: Floats, *, quarter: bool) -> Float
 
     Args:
         net: the net.
-        shear: at its crossings, in any unit, (n_crossings,).
+        shear: at its crossings, in any unit, (n_crossings,), or several, (n_crossings, k).
         places: x and y on the undeformed sheet [mm], (n, 2).
         quarter: whether the net is the part x >= 0, y >= 0 of a sheet; places may be anywhere, and
             the angle changes its sign across either axis.
+
+    Returns:
+        The angle, (n,), or (n, k).
     """
+    from scipy.interpolate import CloughTocher2DInterpolator, NearestNDInterpolator
+    from scipy.spatial import Delaunay
+
     flat = net.points[net.crossings].mean(axis=1)[:, :2]
     sign = np.ones(len(places))
     if quarter:
@@ -125,9 +130,14 @@ def shear_at(net: Net, shear: Floats, places: Floats, *, quarter: bool) -> Float
         mirrored = [flat[own] * flip for own, flip in zip(images, flips, strict=True)]
         signed = [shear[own] * np.prod(flip) for own, flip in zip(images, flips, strict=True)]
         flat, shear = np.vstack([flat, *mirrored]), np.concatenate([shear, *signed])
-    between = CloughTocher2DInterpolator(flat, shear)(places)
+    # Each by itself: the slopes are found by iteration, up to the largest change of all.
+    triangles = Delaunay(flat)
+    columns = [
+        CloughTocher2DInterpolator(triangles, c)(places) for c in shear.reshape(len(flat), -1).T
+    ]
+    between = np.column_stack(columns).reshape(len(places), *shear.shape[1:])
     outside = NearestNDInterpolator(flat, shear)(places)
-    return sign * np.where(np.isnan(between), outside, between)
+    return (sign * np.where(np.isnan(between), outside, between).T).T
 
 
 def _on_tow(

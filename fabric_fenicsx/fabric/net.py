@@ -93,9 +93,8 @@ class Net:
     @property
     def node_lengths(self) -> npt.NDArray[np.float64]:
         """Tow length that each node stands for [mm]: half of each cell it ends, (n_nodes,)."""
-        share = np.zeros(len(self.points))
-        np.add.at(share, self.cells.ravel(), np.repeat(self.lengths / 2.0, 2))
-        return share
+        halves = np.repeat(self.lengths / 2.0, 2)
+        return np.asarray(np.bincount(self.cells.ravel(), halves, len(self.points)), float)
 
 
 def single_tow(

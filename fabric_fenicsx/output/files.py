@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 from collections.abc import Iterator, Mapping
@@ -13,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
-__all__ = ["replacing", "write_npz", "write_text", "write_vtk"]
+__all__ = ["append_text", "replacing", "write_npz", "write_text", "write_vtk"]
 
 
 @contextmanager
@@ -44,8 +45,38 @@ def write_text(path: Path, text: str) -> None:
     _write(path, text.encode("utf-8"))
 
 
-def write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]], *, compressed: bool) -> None:
+def append_text(path: Path, text: str) -> None:
+    """Add a text to the end of a file, in one go.
+
+    Raises:
+        OSError: it cannot be written; what was there before stays, and nothing else.
+    """
+    data = text.encode("utf-8")
+    with path.open("ab", buffering=0) as file:
+        size = file.tell()
+        try:
+            if file.write(data) < len(data):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            file.truncate(size)
+            raise OSError(error.errno, error.strerror, str(path)) from None
+
+
+def write_npz(
+    path: Path,
+    arrays: Mapping[str, npt.NDArray[Any]],
+    *,
+    compressed: bool,
+    durable: bool = False,
+) -> None:
     """Write arrays by their names.
+
+    Args:
+        path: the file.
+        arrays: what to write.
+        compressed: smaller, and ten times as slow.
+        durable: on the disk before it is moved to its place, so that it is whole there even where
+            the machine has stopped.
 
     Raises:
         OSError: they cannot be written; what was there before stays.
@@ -53,7 +84,7 @@ def write_npz(path: Path, arrays: Mapping[str, npt.NDArray[Any]], *, compressed:
     # In memory first: an archive that cannot be closed complains on its own behalf.
     memory = io.BytesIO()
     (np.savez_compressed if compressed else np.savez)(memory, **arrays)
-    _write(path, memory.getbuffer())
+    _write(path, memory.getbuffer(), durable=durable)
 
 
 def write_vtk(path: Path, data: Any, *, portable: bool = False) -> None:
@@ -85,6 +116,9 @@ def write_vtk(path: Path, data: Any, *, portable: bool = False) -> None:
     _write(path, text if isinstance(text, bytes) else text.encode("utf-8"))
 
 
-def _write(path: Path, data: bytes | memoryview) -> None:
-    with replacing(path) as partial:
-        partial.write_bytes(data)
+def _write(path: Path, data: bytes | memoryview, *, durable: bool = False) -> None:
+    with replacing(path) as partial, partial.open("wb") as file:
+        file.write(data)
+        if durable:
+            file.flush()
+            os.fsync(file.fileno())

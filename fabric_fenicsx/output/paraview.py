@@ -34,6 +34,16 @@ COMPONENTS = {
 }
 
 
+HEAD = """<?xml version='1.0' encoding='utf-8'?>
+<VTKFile type="Collection" version="0.1">
+  <Collection>
+"""
+TAIL = """  </Collection>
+</VTKFile>
+"""
+"""Around the steps of a collection."""
+
+
 class TimeSeries:
     """A folder with `tows.pvd` and `crossings.pvd` and the files of their steps.
 
@@ -67,10 +77,12 @@ class TimeSeries:
             self._grids["crossings"] = _grid(places, numbers, VTK_VERTEX)
 
         self._folder.mkdir(parents=True, exist_ok=True)
-        self._steps = self._kept(until) if resume else {}
+        steps = self._kept(until) if resume else {}
+        self._last = max(steps.items(), default=(-1, -math.inf))
         for series in self._grids:
-            self._write_collection(series)
-        kept = {_file(self._folder, series, n).name for series in self._grids for n in self._steps}
+            entries = [_entry(series, number, time) for number, time in steps.items()]
+            write_text(self._folder / f"{series}.pvd", HEAD + "".join(entries) + TAIL)
+        kept = {_file(self._folder, series, n).name for series in self._grids for n in steps}
         for path in list(self._folder.iterdir()):
             ours = re.fullmatch(
                 r"(tows|crossings)(_\d{5,}(\.partial)?\.vtu|\.partial\.pvd)", path.name
@@ -83,7 +95,7 @@ class TimeSeries:
     @property
     def times(self) -> list[float]:
         """Times of the steps in the series [s]."""
-        return list(self._steps.values())
+        return list(self._kept(math.inf).values())
 
     def add(
         self,
@@ -101,12 +113,13 @@ class TimeSeries:
             OSError: a file could not be written.
         """
         snapshot.check(self._net)
-        if self._steps and snapshot.time <= self.times[-1]:
+        last, before = self._last
+        if snapshot.time <= before:
             raise ValueError(
-                f"snapshot: time {snapshot.time:.12g} s is not after {self.times[-1]:.12g} s,"
+                f"snapshot: time {snapshot.time:.12g} s is not after {before:.12g} s,"
                 f" the last step in {self._folder}"
             )
-        number = max(self._steps, default=-1) + 1
+        number = last + 1
         for series, grid in self._grids.items():
             step = vtkUnstructuredGrid()
             step.ShallowCopy(grid)  # shares points and cells
@@ -118,25 +131,22 @@ class TimeSeries:
                 _add_crossings(step, self._net, snapshot)
             step.GetFieldData().AddArray(_array("TimeValue", np.array([snapshot.time])))
             write_vtk(_file(self._folder, series, number), step)
-        self._steps[number] = float(snapshot.time)
+        self._last = number, float(snapshot.time)
         for series in self._grids:
-            self._write_collection(series)
+            path = self._folder / f"{series}.pvd"
+            listed = path.read_text(encoding="utf-8").removesuffix(TAIL)
+            write_text(path, listed + _entry(series, *self._last) + TAIL)
 
     def _kept(self, until: float) -> dict[int, float]:
         """Number and time of the steps that every collection names, up to a time."""
         whole = _listed_steps(self._folder, crossings="crossings" in self._grids)
         return {n: time for n, time in whole.items() if time <= until + 1e-12 * abs(until)}
 
-    def _write_collection(self, series: str) -> None:
-        root = ET.Element("VTKFile", type="Collection", version="0.1")
-        collection = ET.SubElement(root, "Collection")
-        for number, time in self._steps.items():
-            attributes = {"timestep": repr(time), "part": "0"}
-            attributes["file"] = _file(self._folder, series, number).name
-            ET.SubElement(collection, "DataSet", attributes)
-        ET.indent(root)
-        text = ET.tostring(root, encoding="unicode", xml_declaration=True)
-        write_text(self._folder / f"{series}.pvd", text)
+
+def _entry(series: str, number: int, time: float) -> str:
+    """What a collection says of a step."""
+    file = _file(Path(), series, number)
+    return f'    <DataSet timestep="{time!r}" part="0" file="{file}" />\n'
 
 
 def _listed_steps(folder: Path, *, crossings: bool) -> dict[int, float]:

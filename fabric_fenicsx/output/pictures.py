@@ -11,7 +11,6 @@ import numpy.typing as npt
 import pyvista as pv
 from matplotlib import colormaps
 from matplotlib.colors import ListedColormap
-from scipy.interpolate import CubicHermiteSpline
 from vtkmodules.util.numpy_support import numpy_to_vtk
 
 from fabric_fenicsx.fabric.net import Net
@@ -50,8 +49,10 @@ LIGHTS = (((-1.0, 0.9, 1.6), 0.78), ((1.4, 0.2, 0.8), 0.3), ((0.0, 1.0, -1.0), 0
 # Perceptually uniform; without its darkest end, in which the shading of a tube would be lost.
 SEQUENTIAL = ListedColormap(colormaps["viridis"](np.linspace(0.06, 1.0, 256)))
 VIEW_ANGLE = 24.0  # of the perspective [deg]; small, so that the far edge keeps its size
-SPLITS = 4  # straight pieces drawn for each cell
-SIDES = 16  # of a tube
+PIECE = 6.0  # longest straight piece of a tube [pixels]
+PIECES = 4  # of a cell at most
+ROUND = 0.1  # largest distance of a tube's sides from its circle [pixels]
+SIDES = (6, 16)  # of a tube, fewest and most
 
 
 def draw_net(
@@ -109,8 +110,10 @@ def draw_net(
     if not limits[0] < limits[1]:
         raise ValueError(f"picture: limits are {limits}, not a lower and a higher value")
     step = round_step(limits[1] - limits[0])
-    tubes = _tubes(lines, radius if radius is not None else 0.12 * tow_spacing(net))
     tools = [(triangulated(surface), surface) for surface in surfaces]
+    clouds = [*(line.points for line in lines), *(np.asarray(mesh.points) for mesh, _ in tools)]
+    pixel = float(np.ptp(np.concatenate(clouds) if frame is None else frame, axis=0).max())
+    tubes = _tubes(lines, 0.12 * tow_spacing(net) if radius is None else radius, pixel / min(size))
 
     with canvas(path, size, LIGHTS) as plotter:
         for mesh, surface in tools:
@@ -143,10 +146,7 @@ def draw_net(
         scale_bar(plotter, quantity.title, limits, step, size)
         if title is not None:
             headline(plotter, title, 18.0 * _unit(size))
-        if tools:
-            plotter.enable_depth_peeling(8)
-        clouds = (np.asarray(mesh.points) for mesh in (tubes, *(mesh for mesh, _ in tools)))
-        shown = list(clouds) if frame is None else [frame]
+        shown = [tubes.points, *clouds] if frame is None else [frame]
         aim(plotter, view, shown, size)
 
 
@@ -156,20 +156,38 @@ def colour_map(quantity: Quantity, limits: tuple[float, float]) -> Any:
     return colormaps["coolwarm"] if diverging else SEQUENTIAL
 
 
-def _tubes(lines: list[Line], radius: float) -> pv.PolyData:
-    """Tubes around smooth curves through the nodes of all lines, with point data `values`."""
+def _tubes(lines: list[Line], radius: float, pixel: float) -> pv.PolyData:
+    """Tubes around smooth curves through the nodes of all lines, with point data `values`.
+
+    Args:
+        lines: what they follow.
+        radius: of the tubes [mm].
+        pixel: size of a pixel [mm], which nothing needs to be finer than.
+    """
     points, values, polylines, start = [], [], [], 0
     for line in lines:
         arc = arc_length(line.points)
-        slopes = np.gradient(line.points, arc, axis=0, edge_order=2 if len(arc) > 2 else 1)
-        fine = np.interp(np.arange((len(arc) - 1) * SPLITS + 1) / SPLITS, np.arange(len(arc)), arc)
-        points.append(CubicHermiteSpline(arc, line.points, slopes)(fine))
+        pieces = int(np.clip(np.ceil(np.diff(arc).max() / (PIECE * pixel)), 1, PIECES))
+        fine = np.interp(np.arange((len(arc) - 1) * pieces + 1) / pieces, np.arange(len(arc)), arc)
+        points.append(_through(line.points, arc, fine) if pieces > 1 else line.points)
         values.append(np.interp(fine, arc, line.values))
         polylines.append(np.append(len(fine), np.arange(start, start + len(fine))))
         start += len(fine)
     curves = pv.PolyData(np.concatenate(points), lines=np.concatenate(polylines))
     curves["values"] = np.concatenate(values)
-    return curves.tube(radius=radius, n_sides=SIDES, capping=True)
+    # A regular polygon of n sides is up to r (1 - cos π/n) inside of its circle.
+    sides = np.pi / np.arccos(max(1.0 - ROUND * pixel / radius, 0.0))
+    return curves.tube(radius=radius, n_sides=int(np.clip(np.ceil(sides), *SIDES)), capping=True)
+
+
+def _through(points: Array, arc: Array, fine: Array) -> Array:
+    """Cubic Hermite curve through points (n, 3) at their arc lengths, at others (m,)."""
+    slopes = np.gradient(points, arc, axis=0, edge_order=2 if len(arc) > 2 else 1)
+    k = np.clip(np.searchsorted(arc, fine, side="right") - 1, 0, len(arc) - 2)
+    h = np.diff(arc)[k][:, None]
+    t = (fine - arc[k])[:, None] / h
+    p, q, m, n = points[k], points[k + 1], h * slopes[k], h * slopes[k + 1]
+    return np.asarray(p + t * (m + t * (3 * (q - p) - 2 * m - n + t * (2 * (p - q) + m + n))))
 
 
 def _unit(size: tuple[int, int]) -> float:
@@ -220,15 +238,24 @@ def aim(plotter: Any, view: str, clouds: list[Array], size: tuple[int, int]) -> 
     parallel = view != "perspective"
 
     # Where a point appears is ((a - x) / (s aspect), (b - y) / s) with s = half height of the view
-    # at its depth. Move (x, y), then the distance, until the extremes touch the frame.
+    # at its depth. Move (x, y), then the distance, until the extremes touch the frame: those of
+    # some of the points, until no other sticks out.
     x, y, distance = 0.0, 0.0, 3.0 * reach / half
-    for _ in range(60):
-        s = half * (distance if parallel else distance - depth)
-        p, q = (a - x) / (s * aspect), (b - y) / s
-        x += (p.max() + p.min() - left - right) / 2.0 * half * distance * aspect
-        y += (q.max() + q.min() - bottom - top) / 2.0 * half * distance
-        fill = max(np.ptp(p) / (right - left), np.ptp(q) / (top - bottom))
-        distance = max(distance * fill**0.7, 1.05 * float(depth.max()))
+    nearest = 1.05 * float(depth.max())
+
+    def seen(own: Any) -> tuple[Array, Array]:
+        s = half * (distance if parallel else distance - depth[own])
+        return (a[own] - x) / (s * aspect), (b[own] - y) / s
+
+    some: set[int] = set()
+    while outer := {int(e) for at in seen(slice(None)) for e in (at.argmin(), at.argmax())} - some:
+        some |= outer
+        for _ in range(60):
+            p, q = seen(list(some))
+            x += (p.max() + p.min() - left - right) / 2.0 * half * distance * aspect
+            y += (q.max() + q.min() - bottom - top) / 2.0 * half * distance
+            fill = max(np.ptp(p) / (right - left), np.ptp(q) / (top - bottom))
+            distance = max(distance * fill**0.7, nearest)
     focus = middle + x * u + y * v
     camera = plotter.camera
     camera.focal_point = tuple(focus)

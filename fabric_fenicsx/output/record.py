@@ -8,8 +8,10 @@ place and then moved there: a run that dies leaves whole files only.
 from __future__ import annotations
 
 import csv
+import io
 import json
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -19,12 +21,13 @@ import numpy.typing as npt
 
 from ..errors import InputError
 from ..fabric.net import Net
+from ..parallel import from_root
 from ..solving.balance import Balance
 from ..solving.model import Model
 from ..solving.predictor import DEPTH
 from ..solving.snapshot import Snapshot
 from ..solving.stepping import Step, Stepper
-from .files import replacing, write_npz, write_text
+from .files import append_text, write_npz, write_text
 from .paraview import TimeSeries
 from .results import read_net, seen_arrays, write_setup
 from .surfaces import tool_surface
@@ -43,8 +46,14 @@ NUMBERS = ("time", "number", "previous_steps", "predictor_order", "last_step", "
 """What it has beside."""
 
 
+RECENT = 200
+"""Rows of `steps.csv` that are held: whether a run need not go on is seen from its last steps."""
+
+
 class Record:
     """Writes steps as they are accepted. Every method is collective; rank 0 writes.
+
+    What is held does not grow with the number of steps.
 
     Args:
         folder: output folder; made by prepare_folder.
@@ -55,7 +64,7 @@ class Record:
             energies in `steps.csv` are of the whole one.
 
     Attributes:
-        rows: of `steps.csv`, on every rank.
+        recent: the last rows of `steps.csv`, on every rank.
         gaps: distance of each node from each tool at the last step [mm], (n_nodes,).
     """
 
@@ -69,18 +78,19 @@ class Record:
         quarter: bool = False,
     ) -> None:
         self.folder, self.model = folder, model
-        self.rows: list[dict[str, float]] = []
+        self.recent: deque[dict[str, float]] = deque(maxlen=RECENT)
         self.gaps: dict[str, npt.NDArray[np.float64]] = {}
-        self.steps = folder / "steps"
+        self.steps, self._table = folder / "steps", folder / "steps.csv"
         self._root = model.comm.rank == 0
+        self._columns: list[str] = []
         self._seen: dict[str, npt.NDArray[np.float64]] = {}
         if self._root:
             self._open(resume_at)
             (folder / "case.yaml").unlink(missing_ok=True)
             if case_text is not None:
                 write_text(folder / "case.yaml", case_text)
-        self.rows = model.comm.bcast(self.rows)
-        past = self.rows[-1] if self.rows else None
+        self.recent = model.comm.bcast(self.recent)
+        past = self.recent[-1] if self.recent else None
         self._balance = Balance(model, past, quarter=quarter)
 
     def _open(self, resume_at: float | None) -> None:
@@ -88,24 +98,36 @@ class Record:
         folder, net = self.folder, self.model.net
         self.steps.mkdir(exist_ok=True)
         extent = PLATE_EXTENT * float(np.abs(net.points[:, :2]).max())
-        table = folder / "steps.csv"
         write_setup(folder, net, [tool_surface(t, extent, np.zeros(3)) for t in self.model.tools])
         if resume_at is None:
-            for old in [*self.steps.glob("step_*.npz"), table, folder / "result.json"]:
+            for old in [*self.steps.glob("step_*.npz"), self._table, folder / "result.json"]:
                 old.unlink(missing_ok=True)
             self._series = TimeSeries(folder / "paraview", net)
             return
         until = resume_at * (1.0 + 1e-12)
         self._series = TimeSeries(folder / "paraview", net, resume=True, until=until)
-        if table.exists():
-            with table.open(newline="") as file:
-                rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
-            self.rows = [row for row in rows if row["time_s"] <= until]
+        for torn in self.steps.glob("*.partial.npz"):
+            torn.unlink()
+        self._columns, rows = _read_table(self._table)
+        rows = [row for row in rows if row["time_s"] <= until]
+        self.recent.extend(rows)
+        if rows:
+            write_text(self._table, "".join(_line(self._columns, row) for row in [None, *rows]))
+        else:
+            self._table.unlink(missing_ok=True)
+
+    def rows(self) -> list[dict[str, float]]:
+        """All rows of `steps.csv`, on every rank."""
+        rows: list[dict[str, float]] = from_root(
+            self.model.comm, lambda: _read_table(self._table)[1]
+        )
+        return rows
 
     def observe(self, step: Step, measure: Callable[[Snapshot], dict[str, float]]) -> Snapshot:
         """Write what is seen of a converged step: energies, tool forces, the ParaView files."""
         model = self.model
-        snapshot = model.snapshot(step.time)
+        outside = model.outside()
+        snapshot = model.snapshot(step.time, outside)
         row: dict[str, float] = {
             "step": step.number,
             "time_s": step.time,
@@ -113,20 +135,21 @@ class Record:
             "iterations": step.iterations,
             "failed_attempts": step.failures,
         }
-        row |= self._balance.step(step.time)
+        row |= self._balance.step(step.time, outside)
         self.gaps = model.gaps()
         for tool, gap in self.gaps.items():
             row[f"{tool}_penetration_mm"] = max(0.0, -float(gap.min()))
         row |= measure(snapshot)
-        self.rows.append(row)
+        self.recent.append(row)
         places = {tool.name: model.tool_place(tool.name) for tool in model.tools}
         self._seen = seen_arrays(snapshot, places)
         if self._root:
             self._series.add(snapshot, places)
-            with replacing(self.folder / "steps.csv") as path, path.open("w", newline="") as file:
-                writer = csv.DictWriter(file, list(row))
-                writer.writeheader()
-                writer.writerows(self.rows)
+            # A table that goes on keeps the columns that it began with.
+            self._columns = self._columns or list(row)
+            begun = self._table.exists()
+            text = _line(self._columns, row)
+            append_text(self._table, text if begun else _line(self._columns, None) + text)
         return snapshot
 
     def keep(self, step: Step, stepper: Stepper) -> None:
@@ -157,7 +180,28 @@ class Record:
             arrays |= self._seen
             arrays |= {f"history: {name}": values for name, values in histories.items()}
             path = self.steps / f"step_{step.number:05d}.npz"
-            write_npz(path, arrays, compressed=False)
+            write_npz(path, arrays, compressed=False, durable=True)
+
+
+def _read_table(path: Path) -> tuple[list[str], list[dict[str, float]]]:
+    """Columns and rows of `steps.csv`, of whole lines only; nothing where there is none."""
+    if not path.exists():
+        return [], []
+    text = path.read_bytes().decode("utf-8")
+    table = csv.DictReader(io.StringIO(text[: text.rfind("\n") + 1], newline=""))
+    rows = [{k: float(v) for k, v in row.items() if v} for row in table]
+    return list(table.fieldnames or []), rows
+
+
+def _line(columns: Sequence[str], row: dict[str, float] | None) -> str:
+    """A row as it stands in `steps.csv`; the header for None."""
+    line = io.StringIO(newline="")
+    writer = csv.DictWriter(line, columns, extrasaction="ignore")
+    if row is None:
+        writer.writeheader()
+    else:
+        writer.writerow(row)
+    return line.getvalue()
 
 
 def write_result(folder: Path, result: dict[str, Any]) -> None:

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-import pyvista as pv
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
@@ -216,6 +215,8 @@ def _step_file(folder: Path, number: int) -> Path:
 
 
 def _tool(path: Path) -> TriangleSurface:
+    import pyvista as pv
+
     mesh = pv.read(path)
     if not isinstance(mesh, pv.PolyData) or not mesh.n_cells or not mesh.is_all_triangles:
         raise InputError(f"{path}: not the triangles of a tool")

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import pyvista as pv
 
 if TYPE_CHECKING:
+    import pyvista as pv
+
     from fabric_fenicsx.mechanics.tools import Tool
 
 __all__ = ["TOOL_COLOURS", "RevolvedSurface", "TriangleSurface", "tool_surface", "triangulated"]
@@ -109,12 +110,16 @@ def triangulated(surface: RevolvedSurface | TriangleSurface) -> pv.PolyData:
     """The surface as a mesh of triangles in its place [mm]."""
     if isinstance(surface, RevolvedSurface):
         return _revolved(surface)
+    import pyvista as pv
+
     faces = np.insert(surface.cells, 0, 3, axis=1).ravel()
     return pv.PolyData(np.asarray(surface.points, dtype=np.float64) + surface.place, faces=faces)
 
 
 def _revolved(surface: RevolvedSurface, pieces: int = 180) -> pv.PolyData:
     """The surface as a mesh of triangles."""
+    import pyvista as pv
+
     angle = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
     r, z = np.asarray(surface.profile, dtype=np.float64).T
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)

@@ -13,7 +13,6 @@ from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from ..errors import InputError
 from ..fabric.crossings import tow_numbers
@@ -297,8 +296,15 @@ def write_table(
 ) -> None:
     """Write a CSV into the results, on rank 0."""
     if session.root:
-        text = pd.DataFrame(columns).to_csv(index=False, float_format="%.9g")
-        write_text(session.folder / name, text)
+        values = [np.asarray(column).tolist() for column in columns.values()]
+        lines = [",".join(columns)]
+        lines += [",".join(map(_written, row)) for row in zip(*values, strict=True)]
+        write_text(session.folder / name, "\n".join(lines) + "\n")
+
+
+def _written(value: float) -> str:
+    """A number as tables have it; nothing for what is not known."""
+    return "" if value != value else f"{value:.9g}"
 
 
 def extend(summary: dict[str, Any], quantities: dict[str, Any], session: Session) -> dict[str, Any]:

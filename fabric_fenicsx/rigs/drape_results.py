@@ -68,10 +68,9 @@ def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[d
         return []
     places = np.array([[p.x_mm, p.y_mm] for p in case.points])
     quarter = case.symmetry == "quarter"
-    totals, shears, directors = (
-        np.degrees(shear_at(net, shear, places, quarter=quarter))
-        for shear in (axes_shear(snapshot.axes), snapshot.shear_angle, snapshot.director_turn)
-    )
+    angles = (axes_shear(snapshot.axes), snapshot.shear_angle, snapshot.director_turn)
+    at = shear_at(net, np.column_stack(angles), places, quarter=quarter)
+    totals, shears, directors = np.degrees(at).T
     known = known_angles(case, session.base) if outcome.completed else [None] * len(places)
     return [
         {
@@ -104,22 +103,25 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
 
 
 def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -> None:
+    from ..output.mirror import whole_sheet
     from ..output.pictures import draw_net
     from ..output.surfaces import tool_surface
 
     extent = 0.62 * max(case.sheet.width_mm, case.sheet.length_mm)
     surfaces = [tool_surface(tool, extent, model.tool_place(tool.name)) for tool in model.tools]
     depth = case.punch_travel_mm * snapshot.time / case.duration_s
+    net = model.net
+    if case.symmetry == "quarter":
+        net, snapshot = whole_sheet(net, snapshot)
     for view, shown in (
         ("perspective", [s for s in surfaces if s.name != "holder"]),
         ("top", [s for s in surfaces if s.name == "die"]),
     ):
         draw_net(
             session.folder / f"drape_{view}.png",
-            model.net,
+            net,
             snapshot,
             surfaces=shown,
             view=view,
             title=f"punch at {depth:.0f} mm",
-            mirror=case.symmetry == "quarter",
         )

@@ -16,6 +16,7 @@ from scipy.spatial import Delaunay, QhullError
 from ..fabric.crossings import crossings_by_tow
 from ..fabric.net import WARP, Net
 from ..mechanics.contact import LIMIT
+from ..output.record import RECENT
 from ..solving.snapshot import Snapshot
 
 __all__ = ["drape_health", "pointless"]
@@ -59,7 +60,7 @@ three."""
 FLYING, FLYING_STEPS = 10.0, 20
 """Kinetic over stored energy of a sheet in flight, and for how many accepted steps."""
 
-CREEPING_STEPS, CREEPING_SHARE = 200, 1e-3
+CREEPING_STEPS, CREEPING_SHARE = RECENT, 1e-3
 """Accepted steps, two or three times those of a whole drape, that have not got on by a thousandth
 of the run will not see its end."""
 

@@ -93,7 +93,7 @@ def simulate(
     newton = model.newton(force_tolerance=force_tolerance, limit=iteration_limit)
     stepper = Stepper(model, newton, control)
     if resume:
-        files = sorted((folder / "steps").glob("step_*.npz"))
+        files = sorted((folder / "steps").glob("step_*[0-9].npz"))
         if not files:
             raise InputError(f"{folder}: no step to resume from; run without resuming first")
         load_state(files[-1], stepper)
@@ -112,7 +112,7 @@ def simulate(
 
     def keep(step: Step) -> None:
         record.keep(step, stepper)
-        reason = pointless(record.rows, end, [tool.name for tool in model.tools])
+        reason = pointless(list(record.recent), end, [tool.name for tool in model.tools])
         reason = model.comm.bcast(reason)
         if reason:
             raise SolveError(
@@ -147,4 +147,4 @@ def simulate(
         "dofs": int(model.net.points.shape[0] * 6),
         "seconds": {key: round(value, 3) for key, value in seconds.items()},
     }
-    return Run(stop is None, stop, record.rows, last[0] if last else None, record.gaps, summary)
+    return Run(stop is None, stop, record.rows(), last[0] if last else None, record.gaps, summary)

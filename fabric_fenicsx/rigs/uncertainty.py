@@ -25,7 +25,6 @@ from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
-import pandas as pd
 
 from ..errors import InputError
 from ..output.files import write_text
@@ -182,6 +181,8 @@ def _seen(case: Case, result: Mapping[str, Any], folder: Path) -> _Seen:
     compared = rig(case.test).compared
     table: dict[str, Array] = {}
     if compared is not None:
+        import pandas as pd
+
         rows = pd.read_csv(folder / compared.file)
         table = {name: rows[name].to_numpy(dtype=float) for name in rows}
     numbers = dict(_flat(result))
@@ -276,6 +277,8 @@ def _summary(
     for name in compared.columns:
         of_fit, of_specimens = spreads([slope.table[name] for slope in seen])
         columns |= {f"{name}_fit": of_fit, f"{name}_specimens": of_specimens}
+    import pandas as pd
+
     text = pd.DataFrame(columns).to_csv(index=False, float_format="%.6g")
     write_text(folder / "uncertainty.csv", text)
     told["table"] = "uncertainty.csv"

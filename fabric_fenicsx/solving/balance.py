@@ -59,11 +59,16 @@ class Balance:
         if "external_force_x_N" in past:
             self._wrench = _read(past, "external_force_{}_N", "external_moment_{}_N_mm")
 
-    def step(self, time: float) -> dict[str, float]:
-        """Columns for a converged step that ends at ``time``, its increment still in the fields."""
+    def step(self, time: float, outside: dict[str, Array]) -> dict[str, float]:
+        """Columns for a converged step that ends at ``time``, its increment still in the fields.
+
+        Args:
+            time: end of the step [s].
+            outside: what acts from outside, as of ``Model.outside``.
+        """
         model = self.model
         row: dict[str, float] = {}
-        forces = model.tool_forces()
+        forces = model.tool_forces(outside)
         for tool in model.tools:
             force = forces[tool.name] * self._whole[:3] + 0.0
             place = model.tool_place(tool.name)
@@ -71,7 +76,7 @@ class Balance:
             self.external += float((force + self._tool_force[tool.name]) @ moved) / 2.0
             self._tool_force[tool.name], self._tool_place[tool.name] = force, place
             row |= {f"{tool.name}_force_{a}_N": float(f) for a, f in zip("xyz", force, strict=True)}
-        self.external += self._parts * (model.weight_work() + self._support_work())
+        self.external += self._parts * (model.weight_work(outside) + self._support_work())
 
         energies = {name: self._parts * e for name, e in model.system.energies().items()}
         self.lost += self._parts * sum(model.system.losses().values())
@@ -80,7 +85,7 @@ class Balance:
         row |= {f"energy_{name.replace(' ', '_')}_N_mm": e for name, e in energies.items()}
         return (
             row
-            | self._momenta(time)
+            | self._momenta(time, outside)
             | {
                 "external_work_N_mm": self.external,
                 "stored_N_mm": stored,
@@ -90,11 +95,11 @@ class Balance:
             }
         )
 
-    def _momenta(self, time: float) -> dict[str, float]:
+    def _momenta(self, time: float, outside: dict[str, Array]) -> dict[str, float]:
         """Momentum, impulse and what acts from outside; nothing in statics."""
         if self._momentum is None:
             return {}
-        wrench = self._momentum.external() * self._whole + 0.0
+        wrench = self._momentum.external(outside) * self._whole + 0.0
         before = wrench if self._wrench is None else self._wrench
         self._impulse += (before + wrench) / 2.0 * (time - self._time)
         self._wrench, self._time = wrench, time

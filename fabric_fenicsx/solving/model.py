@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from mpi4py import MPI
@@ -324,13 +325,30 @@ class Model:
         """Shear angle γ at each crossing of the net [rad], on every rank."""
         return np.zeros(0) if self.crossings is None else self.crossings.angles()
 
-    def tool_forces(self) -> dict[str, Array]:
-        """Force that each tool exerts on the fabric at the last increment [N], shape (3,) each."""
-        forces = {}
+    def outside(self) -> dict[str, Array]:
+        """What weight, and pressure and friction of each tool, do on w at the last increment.
+
+        On this rank's own nodes, by the names of the terms, (n_owned, 6) each [N, N mm]. It costs
+        an assembly for each: whoever asks for several sums of it hands it over.
+        """
+        names = ["weight"] if np.any(self._full_gravity) else []
         for tool in self.tools:
-            own = -self._on_nodes(tool).sum(axis=0)
-            forces[tool.name] = self.comm.allreduce(own)
-        return forces
+            names.append(tool.name)
+            if self.contacts is not None and tool.name in self.contacts.frictional:
+                names.append(f"{tool.name} friction")
+        return {name: -self.system.term_forces(name) for name in names}
+
+    def tool_forces(self, outside: dict[str, Array] | None = None) -> dict[str, Array]:
+        """Force that each tool exerts on the fabric at the last increment [N], shape (3,) each."""
+        outside = self.outside() if outside is None else outside
+        own = np.zeros((len(self.tools), 3))
+        for force, tool in zip(own, self.tools, strict=True):
+            for name in (tool.name, f"{tool.name} friction"):
+                if name in outside:
+                    force += outside[name][:, :3].sum(axis=0)
+        total = np.zeros_like(own)
+        self.comm.Allreduce(own, total)
+        return dict(zip((tool.name for tool in self.tools), total, strict=True))
 
     def tool_place(self, name: str) -> Array:
         """Where a tool's reference point is at the last increment [mm], shape (3,)."""
@@ -342,20 +360,12 @@ class Model:
         """Distance of each node from each tool [mm], negative inside, (n_nodes,), on every rank."""
         return {} if self.contacts is None else self.contacts.gaps()
 
-    def weight_work(self) -> float:
+    def weight_work(self, outside: dict[str, Array]) -> float:
         """Work of gravity over the step whose increment stands in the fields [N mm]."""
-        if not np.any(self._full_gravity):
+        if "weight" not in outside:
             return 0.0
         increment = self.fields.w.x.array.reshape(-1, BLOCK)[: self.disc.owned]
-        own = -float(np.sum(self.system.term_forces("weight") * increment))
-        return float(self.comm.allreduce(own))
-
-    def _on_nodes(self, tool: Tool) -> Array:
-        """Pressure and friction of a tool on this rank's own nodes, reversed, (n_owned, 3) [N]."""
-        force = self.system.term_forces(tool.name)[:, :3]
-        if self.contacts is not None and tool.name in self.contacts.frictional:
-            force = force + self.system.term_forces(f"{tool.name} friction")[:, :3]
-        return force
+        return float(self.comm.allreduce(float(np.sum(outside["weight"] * increment))))
 
     def reactions(self) -> Array:
         """Force and moment that supports exert on each node [N, N mm], (n_nodes, 6), every rank."""
@@ -363,7 +373,7 @@ class Model:
         self.system.residual(F)
         return self.disc.gather_nodes(F.array_r.reshape(-1, BLOCK))
 
-    def external_work(self) -> Array:
+    def external_work(self, outside: dict[str, Array]) -> Array:
         """Virtual work of all that acts from outside, on w of this rank's nodes, (n_owned, 6).
 
         Weight, tools, supports and nodal loads [N, N mm].
@@ -371,33 +381,30 @@ class Model:
         own = self.disc.owned
         F = self.disc.vector()
         self.system.residual(F)
-        work = np.zeros((own, BLOCK))
+        work = self.system.load_work()
         first = int(self.disc.global_blocks[0]) * BLOCK if own else 0
-        work.ravel()[self.fixed - first] = F.array_r[self.fixed - first]
-        work += self.system.load_work()
-        if np.any(self._full_gravity):
-            work -= self.system.term_forces("weight")
-        for tool in self.tools:
-            work[:, :3] -= self._on_nodes(tool)
+        work.ravel()[self.fixed - first] += F.array_r[self.fixed - first]
+        for part in outside.values():
+            work += part
         return work
 
-    def snapshot(self, time: float) -> Snapshot:
+    def snapshot(self, time: float, outside: dict[str, Array] | None = None) -> Snapshot:
         """The state at the increment set last, in the order of the net, on every rank.
 
         To be called after a step converged and before it becomes the accepted state.
         """
         disc, net = self.disc, self.net
+        outside = self.outside() if outside is None else outside
         u, q = self.disc.current()
-        q_nodes = disc.gather_nodes(q[: disc.owned])
-        directors = np.stack(
-            [rotate(q_nodes, reference) for reference in self._reference_directors()], axis=1
-        )
-        forces = disc.gather_cells(self.system.section_forces())
         pressure = np.zeros((disc.owned, 1))
         for tool in self.tools:
-            force = self.system.term_forces(tool.name)[:, :3]
-            pressure[:, 0] += np.linalg.norm(force, axis=1)
-        displacement = disc.gather_nodes(u[: disc.owned])
+            pressure[:, 0] += np.linalg.norm(outside[tool.name][:, :3], axis=1)
+        nodal = disc.gather_nodes(np.hstack([u[: disc.owned], q[: disc.owned], pressure]))
+        displacement, q_nodes = nodal[:, :3], nodal[:, 3:7]
+        directors = np.stack(
+            [rotate(q_nodes, reference) for reference in self._reference_directors], axis=1
+        )
+        forces = disc.gather_cells(self.system.section_forces())
         axes = self._axes.at(displacement)
         return Snapshot(
             time=time,
@@ -405,13 +412,14 @@ class Model:
             directors=directors,
             section_forces=forces[:, :3],
             section_moments=forces[:, 3:],
-            contact_pressure=disc.gather_nodes(pressure)[:, 0] / net.node_lengths,
+            contact_pressure=nodal[:, 7] / net.node_lengths,
             axes=axes,
             shear_angle=axes_shear(axes) - self._reference_shear,
             director_turn=self.shear_angles(),
             crossing_moment=np.zeros(0) if self.crossings is None else self.crossings.moments(),
         )
 
+    @cached_property
     def _reference_directors(self) -> tuple[Array, Array, Array]:
         nodal = self.disc.nodal_directions()
         d1, d3 = nodal["tangent"], nodal["normal"]

@@ -66,9 +66,9 @@ class Momentum:
         moment = rotate(q[:own], r - np.cross(theta, r) / 2.0 + along)
         return self._sum(f, np.cross(self._points + u[:own], f) + moment)
 
-    def external(self) -> Array:
+    def external(self, outside: dict[str, Array]) -> Array:
         """Force and moment of weight, tools, supports and nodal loads, (6,) [N, N mm]."""
-        return self.wrench(self.model.external_work())
+        return self.wrench(self.model.external_work(outside))
 
     def _sum(self, first: Array, second: Array) -> Array:
         own = np.concatenate([first.sum(axis=0), second.sum(axis=0)])

@@ -10,14 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator, PPoly
 from ufl import conditional, lt
 
 from ...inputs.groups import NotNegative
 from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, size_of
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 __all__ = ["TabulatedDashpot", "TabulatedSpring"]
 
@@ -90,6 +92,8 @@ def _check_table(name: str, x: tuple[float, ...], y: tuple[float, ...]) -> None:
 
 def _cubics(x: tuple[float, ...], y: tuple[float, ...]) -> PPoly:
     """The monotone cubics, and a straight piece behind the last point."""
+    from scipy.interpolate import PchipInterpolator, PPoly
+
     cubics = PchipInterpolator(x, y)
     ending = [0.0, 0.0, float(cubics.derivative()(x[-1])), y[-1]]
     return PPoly(np.column_stack([cubics.c, ending]), [*x, x[-1] + 1.0])

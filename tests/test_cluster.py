@@ -1,0 +1,75 @@
+"""The job scripts: what they call, and that they go on with a run that was begun."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+SCRIPTS = Path(__file__).parents[1] / "scripts" / "cluster"
+
+
+def stand_in(folder, name, first="", then=""):
+    """A program that notes how it was called."""
+    path = folder / name
+    path.write_text(f'#!/bin/sh\n{first}\necho "{name} $*" >> {folder}/called\n{then}\n')
+    path.chmod(0o755)
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A folder to submit from, and the environment that finds the stand-ins."""
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "scripts").symlink_to(SCRIPTS.parent)
+    path = f"{tmp_path / 'bin'}:{os.environ['PATH']}"
+    return tmp_path, {"PATH": path, "SLURM_JOB_ID": "7", "SLURM_NTASKS": "4"}
+
+
+def called(folder):
+    return (folder / "bin" / "called").read_text().splitlines()
+
+
+def test_a_run_is_begun_gone_on_with_and_left_alone(place):
+    folder, env = place
+    stand_in(folder / "bin", "solver")
+    steps = folder / "results" / "steps"
+    steps.mkdir(parents=True)
+    # Nothing, what was being written, an accepted step, the end.
+    for file in (None, "steps/step_00001.partial.npz", "steps/step_00001.npz", "result.json"):
+        if file is not None:
+            (folder / "results" / file).write_text('{\n  "completed": true,\n}')
+        command = [SCRIPTS / "go_on", "case.yaml", "results", "solver"]
+        subprocess.run(command, cwd=folder, env=env, check=True)
+    begun = "solver run case.yaml --out results"
+    assert called(folder) == [begun, begun, f"{begun} --resume"]
+
+
+@pytest.mark.parametrize("nodes", [1, 2])
+def test_a_job_near_its_end_is_stopped_and_queued_again(place, nodes):
+    folder, env = place
+    for name in ("mpirun", "srun"):
+        stand_in(folder / "bin", name, "trap 'exit 130' TERM", "while :; do sleep 0.05; done")
+    stand_in(folder / "bin", "scontrol")
+    job = subprocess.Popen(
+        [SCRIPTS / "slurm", "case.yaml", "results"],
+        cwd=folder,
+        env=env | {"SLURM_JOB_NUM_NODES": str(nodes)},
+    )
+    while not (folder / "bin" / "called").exists():
+        time.sleep(0.02)
+    job.send_signal(signal.SIGUSR1)
+    assert job.wait(timeout=10) == 130
+    launch = "mpirun -n 4" if nodes == 1 else "srun --mpi=pmix"
+    run = f"{launch} fabric-fenicsx run case.yaml --out results"
+    assert called(folder) == [run, "scontrol requeue 7"]
+
+
+def test_a_process_alone_leaves_no_setting_to_those_it_starts():
+    """The settings that make its own start short would part the ranks of another."""
+    code = "import os; b = dict(os.environ); from fabric_fenicsx.parallel import world; "
+    code += "assert world().size == 1; assert dict(os.environ) == b"
+    env = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    subprocess.run([sys.executable, "-c", code], env=env, check=True, timeout=60)
