@@ -99,14 +99,19 @@ def at_travels(table: pd.DataFrame, name: str) -> list[float]:
     return np.interp(TRAVELS, table["displacement_mm"], table[name]).tolist()
 
 
-def page(reports: dict[str, dict[str, Any]], strips: dict[str, pd.DataFrame]) -> str:
+def page(
+    sets: dict[str, list[Path]],
+    reports: dict[str, dict[str, Any]],
+    strips: dict[str, pd.DataFrame],
+) -> str:
     """The page."""
     text = ["# Published strips, and another size foretold", "", OPENING]
     for name, report in reports.items():
         runs = [run for m in report["measurements"] for run in m["runs"]]
         held = ", ".join(run["label"] or run["file"] for run in runs if run["role"] == "holdout")
-        text += [f"## {name}", "", report["headline"], ""]
-        text += [f"*{note}*" for note in report["notes"]] + [""]
+        titles = "; ".join(ff.read_measurement(folder).title for folder in sets[name])
+        text += [f"## {name}", "", f"{titles}.", "", f"**{report['headline']}**", ""]
+        text += [" ".join(report["notes"]), ""]
         text += [f"| model | fitted, rms [N] | held out ({held}) [N] |", "|---|---|---|"]
         text += [*rows_of_errors(report), ""]
         noise = report["error"]["noise"]
@@ -160,7 +165,7 @@ def main() -> None:
         out = arguments.out / name.lower().replace(" ", "_")
         reports[name] = diagnosed(folders, out, arguments.effects)
         strips[name] = foretold(out, spacing)
-    PAGE.write_text(page(reports, strips))
+    PAGE.write_text(page(sets, reports, strips))
 
 
 if __name__ == "__main__":

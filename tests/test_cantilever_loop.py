@@ -354,7 +354,7 @@ def test_scatter_of_x_is_found(scatter):
     "case",
     [
         "baseline",
-        "tilt",
+        pytest.param("tilt", marks=pytest.mark.slow),
         pytest.param("curved down", marks=pytest.mark.slow),
         pytest.param("tanh", marks=pytest.mark.slow),
         pytest.param("cubic", marks=pytest.mark.slow),

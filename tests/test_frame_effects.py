@@ -104,6 +104,7 @@ def test_a_load_cell_of_each_run_without_a_held_out_run():
         assert abs(values[f"run{number}_offset_N"] - offset) < 4.0 * std[f"run{number}_offset_N"]
 
 
+@pytest.mark.slow
 def test_no_candidate_fits_worse_than_the_baseline():
     # Fits in which far readings count less need not come near them.
     found = diagnosed(added=lambda run, t: 0.5 * np.sin(t / 3.0))

@@ -101,7 +101,8 @@ def test_energy_balance_of_a_small_drape(tmp_path):
 def test_a_run_holds_no_more_with_every_step(tmp_path, monkeypatch):
     """Steps are on disk as they are accepted; 1 kB a step is left for caches of the libraries.
 
-    In the median of five: what is imported or compiled once comes once.
+    In the least of five stretches: what every step leaves is in all of them, what is imported,
+    compiled or kept once in some.
     """
     held = []
     original = record.Record.keep
@@ -125,7 +126,7 @@ def test_a_run_holds_no_more_with_every_step(tmp_path, monkeypatch):
     finally:
         tracemalloc.stop()
     assert result["stopped_because"] == "enough"
-    assert np.median(np.diff(held)) < 5 * 1024
+    assert np.diff(held).min() < 5 * 1024
     assert len(pd.read_csv(tmp_path / "steps.csv")) == len(list(tmp_path.glob("steps/*"))) == 40
 
 

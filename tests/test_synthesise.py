@@ -48,7 +48,11 @@ def test_without_effects_it_is_the_formula(tmp_path):
 @pytest.mark.parametrize(
     ("effect", "values"),
     [
-        ("crossover_friction/Dahl", {"m_c_N": 0.006, "slip_angle_rad": 0.02}),
+        pytest.param(
+            "crossover_friction/Dahl",
+            {"m_c_N": 0.006, "slip_angle_rad": 0.02},
+            marks=pytest.mark.slow,
+        ),
         ("shear_locking/power 2", {"k_lock_N": 0.5, "locking_angle_rad": 0.6}),
     ],
 )
@@ -70,6 +74,7 @@ def test_what_was_hidden_is_found(effect, values, tmp_path, capsys):
         assert abs(found["parameters"][key] - value) < 3.0 * found["std"][key]
 
 
+@pytest.mark.slow
 def test_an_effect_of_ones_own_is_found_where_no_other_explains(tmp_path):
     # Ten times as strong as it need be to be seen: a weaker one, a pair of the known imitates.
     made = tmp_path / "made"
