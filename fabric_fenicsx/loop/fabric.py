@@ -292,7 +292,7 @@ def _add_fitted(
     laws: list[dict[str, Any]] = []
     for effect, variant in effects:
         changes = getattr(variant, "changes", None)
-        if changes is not None:
+        if changes is not None and model.values[variant.parameters[0].name] > 0.0:
             (p,) = variant.parameters
             value, h = model.values[p.name], 1e-4 * model.values[p.name]
             above, below = changes(value + h), changes(value - h)

@@ -216,11 +216,7 @@ class Experiment(Protocol):
         ...
 
     def settle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
-        """Make predictions near a model as good as they can be, where they are approximate.
-
-        Raises:
-            SolveError: the model has no solution there.
-        """
+        """Make predictions near a model as good as they can be, where they are approximate."""
         ...
 
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law | None:

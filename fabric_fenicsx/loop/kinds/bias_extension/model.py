@@ -50,7 +50,7 @@ GROUPS = 24
 PACE = 1.5
 #: Points of the way on which a law with memory is followed to its curve.
 ALONG = 60
-#: Share of the work by which a curve may differ from the one that a strip was solved with ...
+#: Share of the work by which a curve may differ from the one that a strip was solved with.
 NEAR = 0.35
 #: How often a strip is solved anew, at most, for each kind of motion.
 MOST = 4
@@ -369,24 +369,34 @@ class BiasExtension(CrossheadTest):
         """Solve the strips of a model that a fit ended with, all that it has at once.
 
         From then on its forces and angles are corrected by what they were off by there: exactly
-        right at that place, their derivatives as before.
-
-        Raises:
-            SolveError: they stop before their end.
+        right at that place, their derivatives as before. Strips that stop before their end leave
+        them as they are.
         """
         key = _solved_by(variants)
         changes: dict[str, Any] = {}
         for v in variants:
             if isinstance(v, StripPullVariant) and v.changes is not None:
-                changes |= v.changes(values[v.parameters[0].name])
+                value = values[v.parameters[0].name]
+                changes |= v.changes(value) if value > 0.0 else {}
         curve = Curve.through(self._moments(variants, values).value)
         if key in self._settled:
             known, with_these = self._settled[key]
-            alike = all(abs(changes[n] - v) <= SETTLED * abs(v) for n, v in with_these.items())
+            alike = changes.keys() == with_these.keys() and all(
+                abs(changes[n] - v) <= SETTLED * abs(v) for n, v in with_these.items()
+            )
             if alike and self._apart(curve, known) < SETTLED:
                 return
+        place = (
+            f"where a fit ended with {', '.join(sorted(v.label for v in key)) or 'the baseline'}"
+        )
+        if place in self._failed:
+            return
         parts = self._mixed(variants, values)
-        exact = self._solve(changes, curve, FINE_STEPS)
+        try:
+            exact = self._solve(changes, curve, FINE_STEPS)
+        except SolveError as error:
+            self._failed[place] = str(error)
+            return
         self._settled[key] = exact, changes
         off = []
         for r, (way, furthest) in enumerate(zip(exact.ways, self._furthest, strict=True)):
