@@ -79,7 +79,7 @@ class CrossheadTest:
         known = self._kinematics(self._points, {})
         gamma, rate = (self._shown(known[key].value) for key in ("gamma", "rate"))
         time = self._at_readings(self._points["time"].value)
-        self.readings = self._read(
+        readings = readings_of(
             measurements,
             np.concatenate([run.columns["force_N"] for _, run in runs]),
             {
@@ -89,6 +89,7 @@ class CrossheadTest:
             },
             usable=np.concatenate([p.certain for p in motions]),
         )
+        self.readings = self._named(readings)
         self._leave_out_uncertain(np.concatenate([p.rate_error for p in motions]))
         self._start()
         shares = {
@@ -114,15 +115,9 @@ class CrossheadTest:
         """Keep what the kinematics need of the rig, before they are asked for."""
         raise NotImplementedError
 
-    def _read(
-        self,
-        measurements: Sequence[Measurement],
-        observed: Array,
-        covariates: Mapping[str, Array],
-        usable: Flags,
-    ) -> Readings:
-        """The readings of all runs; see readings_of."""
-        return readings_of(measurements, observed, covariates, usable=usable)
+    def _named(self, readings: Readings) -> Readings:
+        """The readings with what else a rig knows of them."""
+        return readings
 
     @property
     def _on_the_load_cell(self) -> Array | float:

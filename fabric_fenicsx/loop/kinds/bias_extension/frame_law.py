@@ -23,16 +23,13 @@ from ....mechanics.laws.law import Crossing
 from ....mechanics.laws.springs import PolynomialSpring
 from ....mechanics.laws.tabulated import TabulatedSpring
 from ....rigs.fabric_file import FoundCrossoverKeys
-from ...expressions.marching import Marched, Varying
 from ...inference.effects import Values
-from ..crosshead import of_a_crossing, shifted
 from ..picture_frame.variant import FrameVariant
 
 __all__ = [
     "LIKE_THE_FRAME",
     "crossing_laws",
     "foretold",
-    "frame_moments",
     "locking",
     "locking_variant",
 ]
@@ -51,33 +48,6 @@ def crossing_laws(keys: FoundCrossoverKeys) -> tuple[Any, ...]:
         LinearDashpot(keys.dashpot_N_s_mm),
     )
     return (*baseline, *(law.build(1.0) for law in keys.laws))
-
-
-def frame_moments(laws: tuple[Any, ...], gamma: Array, rate: float) -> Array:
-    """Moments per area [N/mm] of laws on one way out from no shear, (n,).
-
-    Args:
-        laws: of a crossing of unit area.
-        gamma: angles [rad], increasing from 0, (n,).
-        rate: [rad/s].
-    """
-    marched = Marched(("gamma", "gamma_n", "rate", "per_time"), ())
-    moment: Any = 0.0
-    history: dict[str, Any] = {}
-    for k, law in enumerate(laws):
-        crossing = of_a_crossing(marched, k)
-        moment = moment + law.moment(crossing)
-        history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
-    at = gamma[:, None]
-    step = np.diff(at, axis=0, prepend=at[:1] - (at[1] - at[0]))
-    known = {
-        "gamma": Varying(at),
-        "gamma_n": Varying(shifted(at)),
-        "rate": Varying(np.full_like(at, rate)),
-        "per_time": Varying(rate / step),
-    }
-    found = marched.define({"moment": moment}, history)(known, {})["moment"].value
-    return np.broadcast_to(found, at.shape)[:, 0].copy()
 
 
 def locking(gamma: Array, moment: Array) -> Array:

@@ -35,7 +35,7 @@ from ..drape.shear_field import hermite_weights
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
-from .frame_law import crossing_laws, foretold, frame_moments, locking_variant
+from .frame_law import crossing_laws, foretold, locking_variant
 from .quantities import read_together
 from .strip import FINE_STEPS, KNOTS, STEPS, Curve, StripPath, solved_strip, strip_case
 
@@ -142,9 +142,8 @@ class BiasExtension(CrossheadTest):
         """
         if fabric.crossover is None:
             return
-        gamma = np.linspace(0.0, np.radians(KNOTS[-1]), ALONG)
-        along = frame_moments(crossing_laws(fabric.crossover), gamma, self._typical_rate)
-        moments = np.interp(np.radians(KNOTS), gamma, along)
+        laws = crossing_laws(fabric.crossover)
+        moments = self._at_knots([FrameVariant("the frame's", (), laws=lambda _: laws)], {}).value
         form = locking_variant(np.radians(KNOTS), moments)
         if form is not None:
             self.effects = [
@@ -161,10 +160,7 @@ class BiasExtension(CrossheadTest):
         solved = self._solve({}, curve)
         D = self._points["D"].value
         force = np.stack(
-            [
-                way.rest(D[:, r]) + self._work(way, D[:, r], curve).sum(axis=1)
-                for r, way in enumerate(solved.ways)
-            ],
+            [self._force_of(way, D[:, r], curve) for r, way in enumerate(solved.ways)],
             axis=1,
         )
         rows = self.readings.usable & self.readings.first
@@ -203,16 +199,10 @@ class BiasExtension(CrossheadTest):
         self._reached = _reached(first, self._furthest)
         self._reached /= float(self._reached @ first.curve.moments)
 
-    def _read(
-        self,
-        measurements: Sequence[Measurement],
-        observed: Array,
-        covariates: Mapping[str, Array],
-        usable: Flags,
-    ) -> Readings:
-        D = self._at_readings(self._points["D"].value)
-        along = {"displacement [mm]": D, **covariates}
-        return self._together.named(super()._read(measurements, observed, along, usable))
+    def _named(self, readings: Readings) -> Readings:
+        along = {"displacement [mm]": self._at_readings(self._points["D"].value)}
+        found = replace(readings, covariates={**along, **readings.covariates})
+        return self._together.named(found)
 
     @property
     def _on_the_load_cell(self) -> Array:
@@ -251,6 +241,10 @@ class BiasExtension(CrossheadTest):
     def _work(self, way: _Way, D: Array, curve: Curve) -> Array:
         """Σ A dγ/dD m(γ) of the groups at some travels, (n, GROUPS)."""
         return np.asarray(way.area * way.gamma(D, 1) * curve(way.gamma(D)))
+
+    def _force_of(self, way: _Way, D: Array, curve: Curve) -> Array:
+        """Force [N] of a strip that goes as it was solved, with a curve, at some travels, (n,)."""
+        return np.asarray(way.rest(D) + self._work(way, D, curve).sum(axis=1))
 
     def _more_shares(self) -> dict[str, float]:
         """One over the largest force that comes on a tow of the clamps [1/N]."""
@@ -359,9 +353,8 @@ class BiasExtension(CrossheadTest):
         off, size = [], []
         for new, old, furthest in zip(found.ways, before.ways, self._furthest, strict=True):
             D = np.linspace(0.0, furthest, 20)[1:]
-            force = new.rest(D) + self._work(new, D, found.curve).sum(axis=1)
-            foretold = old.rest(D) + self._work(old, D, found.curve).sum(axis=1)
-            off.append(force - foretold)
+            force = self._force_of(new, D, found.curve)
+            off.append(force - self._force_of(old, D, found.curve))
             size.append(force)
         return float(np.linalg.norm(np.concatenate(off)) / np.linalg.norm(np.concatenate(size)))
 
@@ -391,37 +384,27 @@ class BiasExtension(CrossheadTest):
         )
         if place in self._failed:
             return
-        parts = self._mixed(variants, values)
         try:
             exact = self._solve(changes, curve, FINE_STEPS)
         except SolveError as error:
             self._failed[place] = str(error)
             return
         self._settled[key] = exact, changes
-        off = []
-        for r, (way, furthest) in enumerate(zip(exact.ways, self._furthest, strict=True)):
-            D = np.linspace(0.0, furthest, ALONG)
-            gamma, slope = (
-                sum(float(p.weight.value) * p.solved.ways[r].gamma(D, k) for p in parts)
-                for k in (0, 1)
+        self._mixture = self._mixed(variants, values)
+        D = np.linspace(0.0, self._furthest, ALONG)
+        gamma, slope = (self._gamma_at(D, order).value for order in (0, 1))
+        area = np.concatenate([way.area for way in exact.ways])
+        work = (area * slope * curve(gamma)).reshape(*D.shape, GROUPS).sum(axis=2)
+        force, middle = (self._of_ways(Varying(D), name).value for name in ("rest", "middle"))
+        self._corrections[key] = tuple(
+            (
+                PchipInterpolator(at, self._force_of(way, at, curve) - own_force),
+                PchipInterpolator(at, way.middle(at) - own_middle),
             )
-            rest, middle = (
-                sum(
-                    float(p.weight.value * size.value) * getattr(p.solved.ways[r], name)(D)
-                    for p in parts
-                    for size in [p.size if name == "rest" else _number(1.0)]
-                )
-                for name in ("rest", "middle")
+            for way, at, own_force, own_middle in zip(
+                exact.ways, D.T, (force + work).T, middle.T, strict=True
             )
-            force = rest + np.sum(way.area * slope * curve(gamma), axis=1)
-            solved = way.rest(D) + self._work(way, D, curve).sum(axis=1)
-            off.append(
-                (
-                    PchipInterpolator(D, solved - force),
-                    PchipInterpolator(D, way.middle(D) - middle),
-                )
-            )
-        self._corrections[key] = tuple(off)
+        )
 
     def _mixed(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[_Part]:
         """What is known of the strips of a model, solved now where that is not enough.
@@ -452,7 +435,14 @@ class BiasExtension(CrossheadTest):
         return [_Part(self._nearest({}, curve), base), *found]
 
     def _moments(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Varying:
-        """The moments of a model's laws on one way out at the speed of the runs, at KNOTS."""
+        """The moments of a model's laws; see _at_knots."""
+        laws = [v for v in variants if isinstance(v, FrameVariant) and v.laws is not None]
+        return self._at_knots([None, *laws], values)
+
+    def _at_knots(
+        self, forms: Sequence[FrameVariant | None], values: Mapping[str, float]
+    ) -> Varying:
+        """Moments on one way out at the speed of the runs, at KNOTS; None: the baseline's."""
         gamma = np.linspace(0.0, np.radians(KNOTS[-1]), ALONG)[:, None]
         rate = self._typical_rate
         known = {
@@ -461,9 +451,8 @@ class BiasExtension(CrossheadTest):
             "rate": Varying(np.full_like(gamma, rate)),
             "per_time": Varying(np.full_like(gamma, rate / float(gamma[1, 0]))),
         }
-        laws = [v for v in variants if isinstance(v, FrameVariant) and v.laws is not None]
         total = _number(0.0)
-        for v in (None, *laws):
+        for v in forms:
             total += self._moment(v, known, values)
 
         def at_knots(along: Array) -> Array:
@@ -490,19 +479,19 @@ class BiasExtension(CrossheadTest):
         points, runs = self._points["D"].value.shape
         return self._at_readings(values.reshape(points, runs, GROUPS)[:, :, -1])
 
+    def _gamma_at(self, D: Array, order: int) -> Varying:
+        """Angles of all groups, or derivatives in D (n_points, n_runs), (n_points, n_groups)."""
+        total = _number(0.0)
+        for part in self._mixture:
+            ways = part.solved.ways
+            own = np.hstack([way.gamma(D[:, r], order) for r, way in enumerate(ways)])
+            total += part.weight * Varying(own)
+        return total
+
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]
         area = np.concatenate([way.area for way in self._mixture[0].solved.ways])
-        shape = (len(D.value), len(area))
-        gamma, first, second = (Varying(np.zeros(shape)) for _ in range(3))
-        for part in self._mixture:
-            for order, total in enumerate((gamma, first, second)):
-                own = np.hstack(
-                    [w.gamma(D.value[:, r], order) for r, w in enumerate(part.solved.ways)]
-                )
-                total.value[:] += part.weight.value * own
-                for name, slope in part.weight.slopes.items():
-                    total.slopes[name] = total.slopes.get(name, 0.0) + slope * own
+        gamma, first, second = (self._gamma_at(D.value, order) for order in range(3))
 
         def each(values: Array) -> Array:
             """Of every run, at each of its groups."""

@@ -74,13 +74,11 @@ def read_together(measurements: Sequence[Measurement]) -> ReadTogether:
     Raises:
         InputError: hardly any reading of a run has a force or an angle.
     """
-    known = [run.columns.get(ANGLE) for m in measurements for run in m.runs]
-    if all(angle is None or not np.isfinite(angle).any() for angle in known):
-        known = []
     forces = [replace(m, runs=tuple(_forces(m, run) for run in m.runs)) for m in measurements]
     every = [(m, run) for m in measurements for run in m.runs]
     count = len(every)
-    if not known:
+    parents = [n for n, (_, run) in enumerate(every) if _count(run, ANGLE) >= FEWEST]
+    if not parents:
         return ReadTogether(tuple(forces), np.arange(count), 1.0, (np.nan, False))
     given = [m.besides.get(ANGLE) for m in measurements]
     stated = [sigma for sigma in given if sigma is not None]
@@ -92,11 +90,14 @@ def read_together(measurements: Sequence[Measurement]) -> ReadTogether:
         largest = max(float(np.nanmax(np.abs(r.columns["force_N"]), initial=0.0)) for _, r in every)
         noise = max(float(np.nan_to_num(_rough(every, "force_N"))), LEAST_FORCE * largest) or 1.0
     unit = noise / sigma
-    angles = [replace(m, runs=tuple(_angles(run, unit) for run in m.runs)) for m in measurements]
-    parents = [n for n, (_, run) in enumerate(every) if _count(run, ANGLE) >= FEWEST]
-    kept = [replace(m, runs=tuple(r for r in m.runs if r.count >= FEWEST)) for m in angles]
+    read = [[run for run in m.runs if _count(run, ANGLE) >= FEWEST] for m in measurements]
+    angles = [
+        replace(m, runs=tuple(_angles(run, unit) for run in runs))
+        for m, runs in zip(measurements, read, strict=True)
+        if runs
+    ]
     return ReadTogether(
-        (*forces, *(m for m in kept if m.runs)),
+        (*forces, *angles),
         np.array([*range(count), *parents]),
         unit,
         (sigma, bool(stated)),
@@ -134,7 +135,7 @@ def _forces(measurement: Measurement, run: Run) -> Run:
 
 def _angles(run: Run, unit: float) -> Run:
     """The angles of a run, in newtons."""
-    read = np.isfinite(run.columns.get(ANGLE, np.full(run.count, np.nan)))
+    read = np.isfinite(run.columns[ANGLE])
     columns = {name: run.columns[name][read] for name in ("time_s", "displacement_mm")}
-    columns["force_N"] = unit * run.columns[ANGLE][read] if read.any() else np.zeros(0)
+    columns["force_N"] = unit * run.columns[ANGLE][read]
     return replace(run, columns=columns, label=f"{run.label or run.file}, angle")
