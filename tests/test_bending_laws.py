@@ -11,7 +11,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 from solve import Statics
-from ufl import as_ufl
+from ufl import as_ufl, as_vector
 
 from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.fabric.section import RectangularSection
@@ -20,12 +20,14 @@ from fabric_fenicsx.loop.kinds.cantilever import CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.effects import CANTILEVER_EFFECTS
 from fabric_fenicsx.loop.kinds.cantilever.hanging import HangingTow
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
+from fabric_fenicsx.loop.kinds.cantilever.terms import terms
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.mechanics.bending_laws import (
     BENDING_LAWS,
     CubicBending,
     HyperbolicBending,
     StickSlipBending,
+    TabulatedBending,
     TanhBending,
 )
 from fabric_fenicsx.rigs.cases import TowKeys
@@ -41,11 +43,17 @@ EXACT = [
     (TanhBending(2.0, 0.01), lambda k: 2.0 * np.tanh(k / 0.01)),
     (StickSlipBending(2.0, 0.01), lambda k: 2.0 * np.clip(k / 0.01, -1.0, 1.0)),
     (CubicBending(5.0), lambda k: 5.0 * k**3),
+    # Of a straight line, and so beyond its points as well, all cubics are that line.
+    (TabulatedBending((0.0, 0.01, 0.05), (0.0, -0.2, -1.0)), lambda k: -20.0 * k),
 ]
 
 
 def value(expression):
     return float(as_ufl(expression)(()))
+
+
+def number(given):
+    return as_vector(given) if isinstance(given, tuple) else as_ufl(given)
 
 
 def test_every_law_is_here():
@@ -56,16 +64,16 @@ def test_every_law_is_here():
 def test_moment_energy_and_stiffness(law, exact):
     """Odd; the energy is the moment's integral, by Simpson's rule, and the stiffness its slope."""
     for kappa in (-0.3, -0.004, 0.0, 0.007, 0.05):
-        assert value(law.moment(as_ufl(kappa), as_ufl)) == pytest.approx(exact(kappa), rel=1e-9)
+        assert value(law.moment(as_ufl(kappa), number)) == pytest.approx(exact(kappa), rel=1e-9)
         # The kink of sticking at 0.01 lies on a grid of 0.0001.
         path = np.linspace(0.0, kappa, 2 * round(abs(kappa) / 2e-4) + 1)
         weight = np.ones(len(path))
         weight[1:-1:2], weight[2:-1:2] = 4.0, 2.0
         step = path[1] - path[0] if len(path) > 1 else 0.0
         work = float(weight @ exact(path)) * step / 3.0
-        assert value(law.energy(as_ufl(kappa), as_ufl)) == pytest.approx(work, rel=1e-5, abs=1e-12)
+        assert value(law.energy(as_ufl(kappa), number)) == pytest.approx(work, rel=1e-5, abs=1e-12)
     slope = (exact(1e-9) - exact(-1e-9)) / 2e-9
-    assert value(law.stiffness(as_ufl)) == pytest.approx(slope, rel=1e-6, abs=1e-6)
+    assert value(law.stiffness(number)) == pytest.approx(slope, rel=1e-6, abs=1e-6)
 
 
 @pytest.mark.parametrize("variant", NONLINEAR.variants, ids=lambda v: v.label)
@@ -139,3 +147,26 @@ def test_a_case_bends_less_with_a_law(tmp_path):
         tips.append(result["quantities"]["specimens"][0]["tip_z_mm"])
     assert tips[0] < -5.0
     assert tips[0] == pytest.approx(tips[1], rel=1e-4)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_bending_law_without_a_formula_goes_through_the_keys_of_a_case(count, tmp_path):
+    """Its table has the moment of the term, as far as strips were bent and with B, to 0.3 %."""
+    bend, per_C1, C1 = 0.08, 2e-4, 500.0
+    ranges = {"length": 200.0, "curvature": bend, "x": 150.0, "z": 120.0}
+    ranges["stiffness_per_C1"] = per_C1
+    (term,) = (t for t in terms(ranges, ()) if t.name == "bending_moment_of_curvature")
+    variant = term.variants[count - 1]
+    assert len(variant.amplitudes) == count
+    values = {"C1_MPa": C1, f"{term.name}_half_1_mm": 0.3 * bend}
+    values |= {p.name: 0.9 - 1.4 * k for k, p in enumerate(variant.amplitudes)}
+    entries, slopes = law_entries(variant, values, tmp_path)
+    (law,) = (keys.build() for keys in TowKeys.model_validate({"bending": entries}).bending)
+    B = C1 * per_C1
+    for kappa in np.linspace(-bend, bend, 41):
+        k = as_ufl(float(kappa))
+        expected = value(variant.added_moment({**values, "B": B}, {"kappa": k}))
+        assert value(law.moment(k, number)) == pytest.approx(expected, abs=3e-3 * B * bend)
+    # It goes with the stiffness.
+    (of_C1,) = slopes["C1_MPa"].values()
+    assert np.allclose(np.array(of_C1) * C1, law.moments, rtol=1e-6)

@@ -19,6 +19,7 @@ from test_cli import MPI, contents
 from test_drape_loop import angle, made_up, marks, written
 
 from fabric_fenicsx.__main__ import main
+from fabric_fenicsx.loop.fabric import NEAREST
 from fabric_fenicsx.loop.kinds.drape import model as drape
 from fabric_fenicsx.loop.kinds.drape.model import Drape
 from fabric_fenicsx.loop.report.content import SCHEMA
@@ -144,6 +145,7 @@ def test_the_unexplained_says_what_came_nearest(diagnosed, tmp_path):
     assert report["verdict"] == "unexplained"
     assert report["best"]["effects"] and report["best"]["effects"][0]["name"] in report["headline"]
     assert report["best"]["error_fit"] > 1.5 * report["error"]["noise"]
+    assert (tmp_path / "out" / NEAREST).exists()
 
 
 class Images(HTMLParser):
@@ -203,7 +205,10 @@ def test_the_same_data_give_the_same_report(diagnosed, tmp_path):
 def test_effects_narrows_the_search(diagnosed, tmp_path, capsys):
     folder, _ = diagnosed["crossover_friction-dahl"]
     names = ["crossover_friction", "load_drift"]
+    # As an earlier diagnosis into the same folder leaves it, which explained nothing.
+    (tmp_path / NEAREST).write_text("# of other measurements")
     assert command("diagnose", folder, "--out", tmp_path, "--effects", ", ".join(names)) == 0
+    assert not (tmp_path / NEAREST).exists()
     report = report_of(tmp_path)
     assert [candidate["name"] for candidate in report["candidates"]] == names
     printed = capsys.readouterr().out

@@ -139,6 +139,9 @@ def diagnose(
         if any(d.best is not None for d, _, _ in parts):
             measured = _with_measurements(parts, tests)
             write_fabric(folder, fabric_content(measured, folder, nearest=True), NEAREST)
+        else:
+            # That of an earlier diagnosis, which is none of these measurements' any more.
+            (folder / NEAREST).unlink(missing_ok=True)
         write_report(folder, parts, report)
     return Found(report, tuple(diagnosis for diagnosis, _, _ in parts), fabric)
 

@@ -8,6 +8,7 @@ moment are those out of the sheet's plane.
     tanh        m = m_s tanh y              ψ = m_s κ_s ln cosh y
     stick-slip  m = m_s y, at most m_s      ψ = m_s κ_s (min(|y|, 1)²/2 + max(|y| − 1, 0))
     cubic       m = b κ³                    ψ = b κ⁴/4
+    tabulated   m through points            ψ of its cubics, see laws.tabulated
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ from typing import Any, ClassVar
 
 from ufl import as_vector, exp, ln, max_value, min_value, tanh
 
+from ..inputs.groups import NotNegative
 from .fields import TowFields
-from .laws.law import Declared, number, size_of
+from .laws.law import Declared, number, signed, size_of
+from .laws.tabulated import check_table, cubics_of, evaluated
 from .section_laws import ElasticSection
 
 __all__ = [
@@ -30,6 +33,7 @@ __all__ = [
     "HyperbolicBending",
     "SlippingBending",
     "StickSlipBending",
+    "TabulatedBending",
     "TanhBending",
     "bent_section",
 ]
@@ -152,8 +156,49 @@ class CubicBending(BendingLaw):
         return 0.0
 
 
+@dataclass(frozen=True)
+class TabulatedBending(BendingLaw):
+    """Moment through points from (0, 0), as a tester reads it; beyond the last straight on.
+
+    It may fall and be negative: it stands beside B κ, and only both together must rise.
+
+    Attributes:
+        curvatures: [1/mm], increasing from 0.
+        moments: [N], 0 at first.
+    """
+
+    curvatures: Any = number("curvatures_1_mm", "curvatures, increasing from 0", list[NotNegative])
+    moments: Any = number("moments_N", "moments per width there, beside B κ", list[float])
+
+    law = "tabulated"
+
+    def __post_init__(self) -> None:
+        check_table(self.law, self.curvatures, self.moments, falling=True)
+
+    def moment(self, kappa: Any, number: Number) -> Any:
+        """The cubic of the interval that |κ| lies in, with the sign of κ."""
+        cubics = cubics_of(self.curvatures, self.moments)
+        return signed(kappa, evaluated(cubics, size_of(kappa), number))
+
+    def energy(self, kappa: Any, number: Number) -> Any:
+        """∫ m dκ from 0 to |κ|."""
+        quartics = cubics_of(self.curvatures, self.moments).antiderivative()
+        return evaluated(quartics, size_of(kappa), number)
+
+    def stiffness(self, number: Number) -> Any:
+        """Slope of the first cubic at 0."""
+        return number(float(cubics_of(self.curvatures, self.moments).c[2, 0]))
+
+
 BENDING_LAWS: dict[str, type[BendingLaw]] = {
-    law.law: law for law in (HyperbolicBending, TanhBending, StickSlipBending, CubicBending)
+    law.law: law
+    for law in (
+        HyperbolicBending,
+        TanhBending,
+        StickSlipBending,
+        CubicBending,
+        TabulatedBending,
+    )
 }
 """Every law by its name in a case."""
 

@@ -21,7 +21,7 @@ from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, si
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-__all__ = ["TabulatedDashpot", "TabulatedSpring"]
+__all__ = ["TabulatedDashpot", "TabulatedSpring", "check_table", "cubics_of", "evaluated"]
 
 MOMENTS = "moments per area there, not falling"
 
@@ -41,17 +41,17 @@ class TabulatedSpring(CrossingLaw):
     law = "tabulated_spring"
 
     def __post_init__(self) -> None:
-        _check_table(self.name, self.angles, self.moments)
+        check_table(self.name, self.angles, self.moments)
 
     def moment(self, at: Crossing) -> Any:
         """The cubic of the interval that |γ| lies in, with the sign of γ."""
-        cubics = _cubics(self.angles, self.moments)
-        return signed(at.gamma, _evaluated(cubics, at.size, at.number))
+        cubics = cubics_of(self.angles, self.moments)
+        return signed(at.gamma, evaluated(cubics, at.size, at.number))
 
     def energy(self, gamma: Any, memory: Mapping[str, Any], number: Callable[[Any], Any]) -> Any:
         """∫ M dγ from 0 to |γ|."""
-        quartics = _cubics(self.angles, self.moments).antiderivative()
-        return _evaluated(quartics, size_of(gamma), number)
+        quartics = cubics_of(self.angles, self.moments).antiderivative()
+        return evaluated(quartics, size_of(gamma), number)
 
 
 @dataclass(frozen=True)
@@ -71,26 +71,33 @@ class TabulatedDashpot(CrossingLaw):
     law = "tabulated_dashpot"
 
     def __post_init__(self) -> None:
-        _check_table(self.name, self.rates, self.moments)
+        check_table(self.name, self.rates, self.moments)
 
     def moment(self, at: Crossing) -> Any:
         """The cubic of the interval that |γ̇| lies in, with the sign of γ̇."""
-        cubics = _cubics(self.rates, self.moments)
-        return signed(at.rate, _evaluated(cubics, size_of(at.rate), at.number))
+        cubics = cubics_of(self.rates, self.moments)
+        return signed(at.rate, evaluated(cubics, size_of(at.rate), at.number))
 
 
-def _check_table(name: str, x: tuple[float, ...], y: tuple[float, ...]) -> None:
+def check_table(
+    name: str, x: tuple[float, ...], y: tuple[float, ...], *, falling: bool = False
+) -> None:
+    """Refuse a table that is none.
+
+    Raises:
+        ValueError: why; unless they may be ``falling``, also that its moments fall.
+    """
     if len(x) != len(y) or len(x) < 2:
         raise ValueError(f"{name}: {len(x)} and {len(y)} values; two or more pairs are needed")
     if x[0] != 0.0 or y[0] != 0.0:
         raise ValueError(f"{name}: the table starts at ({x[0]}, {y[0]}), not at (0, 0)")
     if any(b <= a for a, b in pairwise(x)):
         raise ValueError(f"{name}: the first column must increase")
-    if any(b < a for a, b in pairwise(y)):
+    if not falling and any(b < a for a, b in pairwise(y)):
         raise ValueError(f"{name}: the moments must not fall")
 
 
-def _cubics(x: tuple[float, ...], y: tuple[float, ...]) -> PPoly:
+def cubics_of(x: tuple[float, ...], y: tuple[float, ...]) -> PPoly:
     """The monotone cubics, and a straight piece behind the last point."""
     from scipy.interpolate import PchipInterpolator, PPoly
 
@@ -99,7 +106,7 @@ def _cubics(x: tuple[float, ...], y: tuple[float, ...]) -> PPoly:
     return PPoly(np.column_stack([cubics.c, ending]), [*x, x[-1] + 1.0])
 
 
-def _evaluated(pieces: PPoly, size: Any, number: Callable[[Any], Any]) -> Any:
+def evaluated(pieces: PPoly, size: Any, number: Callable[[Any], Any]) -> Any:
     """Piecewise polynomials at a size that is not negative; the last piece goes on for ever."""
     order, count = pieces.c.shape
     knots = number(tuple(pieces.x[:-1]))

@@ -160,6 +160,7 @@ class Cantilever:
             "curvature": self._largest_curvature,
             "x": float(np.abs(x[rows]).max()),
             "z": float(np.abs(self._observed[rows]).max()),
+            "stiffness_per_C1": self.stiffness_per_C1,
         }
         return terms(ranges, np.unique(self._run[rows]).tolist())
 

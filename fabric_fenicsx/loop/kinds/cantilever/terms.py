@@ -20,10 +20,13 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
 from ufl import exp, max_value, min_value
 
 from ....inputs.parameters import Parameter
+from ....mechanics.bending_laws import TabulatedBending
 from ....mechanics.laws.shaped import shape_of
+from ....mechanics.scalars import numpy_function, symbol
 from ...inference.effects import Effect, Shape, Values, of_run
 from .variant import StripVariant
 
@@ -46,6 +49,10 @@ LARGEST = 10.0
 HALF_WAY = (0.1, 0.6)
 #: Places are seen within this many times the largest reading.
 BEYOND = 1.1
+#: Range of the strips' bending stiffness.
+PER_C1 = "stiffness_per_C1"
+#: Points of a bending moment as a table.
+TABULATED = 25
 #: Places are counted from there.
 ENDS = ("clamp", "free end")
 
@@ -61,7 +68,7 @@ def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
 
     Args:
         ranges: largest value in the fitted readings of "length", "x", "z" [mm] and of the
-            baseline's "curvature" [1/mm].
+            baseline's "curvature" [1/mm]; the "stiffness_per_C1" of the strips [mm³].
         runs: that are fitted, counted from 0.
     """
     found = [*_of_the_strip(ranges), *_of_the_camera(ranges)]
@@ -108,9 +115,12 @@ def strip_term(
     def made(f: Callable[[Values, Values], Any] | None) -> Any:
         return None if f is None else lambda p, at: f(found(p), at)
 
+    laws = own.laws
     variant = StripVariant(
         "as found",
         (amount,),
+        laws=None if laws is None else lambda p: laws(found(p)),
+        of_baseline=own.of_baseline,
         added_moment=made(own.added_moment),
         added_curvature=made(own.added_curvature),
         load=made(own.load),
@@ -147,6 +157,9 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
                 "curvature_1_mm", "log_flexibility", bend, partial(_by_size, g, half.name, bend)
             ),
             added_moment=partial(_odd, g, half.name),
+            # Terms that an older version wrote do not say it.
+            laws=partial(_tabulated, g, half.name, ranges) if PER_C1 in ranges else None,
+            of_baseline=("C1_MPa",),
         )
         for label, parameters, g in _splines(name, SPLINES)
     ]
@@ -230,6 +243,19 @@ def _flexible(g: Of, end: str, longest: float, p: Values, at: Values) -> Any:
 def _odd(g: Of, half: str, p: Values, at: Values) -> Any:
     size = abs(at["kappa"])
     return p["B"] * at["kappa"] * (exp(-g(p, size / (size + p[half]))) - 1)
+
+
+def _tabulated(
+    g: Of, half: str, ranges: Mapping[str, float], p: Values
+) -> tuple[TabulatedBending, ...]:
+    """The added moment as a case has it, as far as strips were bent."""
+    kappa = symbol()
+    at = {**p, "B": p["C1_MPa"] * ranges[PER_C1]}
+    moment = numpy_function([_odd(g, half, at, {"kappa": kappa})], {"kappa": kappa})
+    # The same whatever is fitted, and close to nothing, where the moment may change at once.
+    points = ranges["curvature"] * np.linspace(0.0, 1.0, TABULATED) ** 2
+    (values,) = moment({"kappa": points})
+    return (TabulatedBending(tuple(points.tolist()), tuple(values.tolist())),)
 
 
 def _of_place(unit: float, g: Of, end: str, longest: float, p: Values, at: Values) -> Any:

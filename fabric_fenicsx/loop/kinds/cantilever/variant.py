@@ -22,6 +22,7 @@ class StripVariant(Variant):
 
     Attributes:
         laws: bending moments per width (mechanics.bending_laws) added to B κ.
+        of_baseline: parameters of the baseline that ``laws`` needs as well.
         moment: the same as one expression [N mm/mm] of the curvature κ [1/mm].
         unloaded: curvature of the unloaded strip [1/mm]; κ is what exceeds it.
         slope: turn of the root [rad], of the moment per width there [N mm/mm].
@@ -36,6 +37,7 @@ class StripVariant(Variant):
     """
 
     laws: Callable[[Values], tuple[BendingLaw, ...]] | None = None
+    of_baseline: tuple[str, ...] = ()
     moment: Callable[[Values, Any], Any] | None = None
     unloaded: Callable[[Values], Any] | None = None
     slope: Callable[[Values, Any], Any] | None = None
