@@ -29,7 +29,16 @@ if TYPE_CHECKING:
     from ..solving.snapshot import Snapshot
     from .common import Session
 
-__all__ = ["RIG", "BiasExtensionCase", "build", "clamps", "middle_zone", "run", "waist"]
+__all__ = [
+    "RIG",
+    "BiasExtensionCase",
+    "build",
+    "clamps",
+    "middle_zone",
+    "run",
+    "slip_limit",
+    "waist",
+]
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -143,6 +152,17 @@ def clamps(net: Net, case: BiasExtensionCase) -> tuple[Integers, Integers]:
     return lower, upper
 
 
+def slip_limit(case: BiasExtensionCase) -> float | None:
+    """Force at which a crossing of the net slips [N], None: never.
+
+    Where the edges want other spacings the fabric stays what it is: limits go with the area.
+    """
+    limit, (warp, weft) = case.crossover.slip_limit_N, case.spacings
+    if limit is None:
+        return None
+    return limit * (warp * weft / (case.warp_spacing_mm * case.weft_spacing_mm))
+
+
 def build(case: BiasExtensionCase, session: Session) -> Model:
     """The model of a strip. Collective."""
     from ..solving.model import Support
@@ -156,11 +176,7 @@ def build(case: BiasExtensionCase, session: Session) -> Model:
         return np.tile([0.0, crosshead(case, time), 0.0], (len(upper), 1))
 
     shares = case.strip.shares(net.points[net.crossings[:, 0]], case.spacings)
-    # Where the edges want other spacings the fabric stays what it is: limits go with the area.
-    limit, (warp, weft) = case.crossover.slip_limit_N, case.spacings
-    if limit is not None:
-        limit *= warp * weft / (case.warp_spacing_mm * case.weft_spacing_mm)
-    crossover = case.crossover.model_copy(update={"slip_limit_N": limit})
+    crossover = case.crossover.model_copy(update={"slip_limit_N": slip_limit(case)})
     return fabric_model(
         case.model_copy(update={"crossover": crossover}),
         net,

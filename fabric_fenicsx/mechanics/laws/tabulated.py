@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 __all__ = ["TabulatedDashpot", "TabulatedSpring"]
 
+Numbers = tuple[tuple[float, ...], tuple[float, ...]]
+"""Where the pieces of a table begin, and the coefficients of each."""
+
 MOMENTS = "moments per area there, not falling"
 
 
@@ -45,13 +48,16 @@ class TabulatedSpring(CrossingLaw):
 
     def moment(self, at: Crossing) -> Any:
         """The cubic of the interval that |γ| lies in, with the sign of γ."""
-        cubics = _cubics(self.angles, self.moments)
-        return signed(at.gamma, _evaluated(cubics, at.size, at.number))
+        return signed(at.gamma, _evaluated(self.numbers_of_cubics(), at.size, at.number))
+
+    def numbers_of_cubics(self) -> Numbers:
+        """Where the pieces begin, and their coefficients, of each those of high powers first."""
+        return _numbers(_cubics(self.angles, self.moments))
 
     def energy(self, gamma: Any, memory: Mapping[str, Any], number: Callable[[Any], Any]) -> Any:
         """∫ M dγ from 0 to |γ|."""
         quartics = _cubics(self.angles, self.moments).antiderivative()
-        return _evaluated(quartics, size_of(gamma), number)
+        return _evaluated(_numbers(quartics), size_of(gamma), number)
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ class TabulatedDashpot(CrossingLaw):
     def moment(self, at: Crossing) -> Any:
         """The cubic of the interval that |γ̇| lies in, with the sign of γ̇."""
         cubics = _cubics(self.rates, self.moments)
-        return signed(at.rate, _evaluated(cubics, size_of(at.rate), at.number))
+        return signed(at.rate, _evaluated(_numbers(cubics), size_of(at.rate), at.number))
 
 
 def _check_table(name: str, x: tuple[float, ...], y: tuple[float, ...]) -> None:
@@ -99,11 +105,16 @@ def _cubics(x: tuple[float, ...], y: tuple[float, ...]) -> PPoly:
     return PPoly(np.column_stack([cubics.c, ending]), [*x, x[-1] + 1.0])
 
 
-def _evaluated(pieces: PPoly, size: Any, number: Callable[[Any], Any]) -> Any:
+def _numbers(pieces: PPoly) -> Numbers:
+    """Where the pieces begin and their coefficients."""
+    return tuple(pieces.x[:-1].tolist()), tuple(pieces.c.T.ravel().tolist())
+
+
+def _evaluated(numbers: Numbers, size: Any, number: Callable[[Any], Any]) -> Any:
     """Piecewise polynomials at a size that is not negative; the last piece goes on for ever."""
-    order, count = pieces.c.shape
-    knots = number(tuple(pieces.x[:-1]))
-    coefficients = number(tuple(pieces.c.T.ravel()))
+    count = len(numbers[0])
+    order = len(numbers[1]) // count
+    knots, coefficients = (number(part) for part in numbers)
     value: Any = None
     for i in reversed(range(count)):
         s = size - knots[i]
