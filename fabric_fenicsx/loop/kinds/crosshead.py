@@ -223,6 +223,51 @@ class CrossheadTest:
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """None: the moment depends on the angle, its rate and its past; see Experiment."""
 
+    def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
+        """What a term without a formula depends on, at every reading; see Experiment."""
+        assert isinstance(variant, FrameVariant)
+        if variant.laws is None:
+            known = self._force(self._points, (), values)
+            return self._at_readings(self._known(known)[variant.of[0]]().value)
+        key = (variant, "along")
+        if key not in self._compiled:
+            names = tuple(p.name for p in variant.parameters) + variant.of_baseline
+            marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
+            law = variant.laws(marched.at)[0]
+            crossing = of_a_crossing(marched, 0)
+            history = {f"0 {n}": value for n, value in law.history(crossing).items()}
+            variable = law.variable_at(crossing)
+            self._compiled[key] = marched.define({"variable": variable}, history)
+        found = self._compiled[key](self._kinematics(self._points, {}), values)["variable"]
+        return self._shown(found.value)
+
+    def _ranges(self) -> dict[str, float]:
+        """Largest values in the fitted readings of what terms without a formula depend on.
+
+        By the names that picture_frame.terms has for them.
+        """
+        rows = self.readings.fit & self.readings.first
+
+        def most(values: Array) -> float:
+            return float(np.abs(values[rows]).max())
+
+        D, speed, time = (self._points[name].value for name in ("D", "D_rate", "time"))
+        change = np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0, prepend=0.0)
+        change[0] = 0.0
+        force = float(np.abs(self.readings.observed[rows]).max())
+        acceleration = self._per_second(self._points["D_rate"]).value
+        return {
+            "angle": most(self._gamma),
+            "rate": most(self._rate),
+            "path": most(self._shown(np.cumsum(np.abs(change), axis=0))),
+            "time": most(self._at_readings(time - time[0])),
+            "displacement": most(self._at_readings(D)),
+            "speed": most(self._at_readings(speed)),
+            "acceleration": most(self._at_readings(acceleration)),
+            "force": force,
+            "force_rate": force / max(float(np.median(time[-1])), 1e-9),
+        }
+
     def predict(
         self,
         variants: Sequence[Variant],

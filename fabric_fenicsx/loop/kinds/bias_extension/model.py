@@ -14,8 +14,9 @@ that go alike are taken together.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ from .frame_law import crossing_laws, foretold, locking_variant
 from .quantities import first_curve, read_together, strip_of
 from .solved import GROUPS, Part, Solved, SolvedStrips, Wanted, gamma_of, number, of_ways, reached
 from .strip import FINE_STEPS, KNOTS, Curve, strip_case
+from .terms import strip_terms
 
 __all__ = ["BiasExtension"]
 
@@ -64,7 +66,6 @@ class BiasExtension(CrossheadTest):
     listed = BIAS_EXTENSION_EFFECTS
     one_curve = None
     curves_only = False
-    terms: tuple[Effect, ...] = ()
 
     def __init__(
         self,
@@ -76,9 +77,16 @@ class BiasExtension(CrossheadTest):
         self._settled: dict[frozenset[Variant], tuple[Solved, dict[str, Any]]] = {}
         #: What a law that nothing was fitted of foretells; see frame_law.foretold.
         self.foretold: dict[str, float] = {}
+        #: Force of the strips as it was last foretold [N], also where angles are read.
+        self._pull = number(0.0)
         self._together = read_together(measurements)
         self._angles, self._parent = self._together.angles, self._together.parent
         super().__init__(self._together.measurements, own, like)
+
+    @cached_property
+    def terms(self) -> list[Effect]:
+        """Terms without a formula over what the fitted readings reached."""
+        return strip_terms(self._ranges())
 
     def take(self, fabric: FabricFile) -> None:
         """Take what a picture frame found, as a further form of locking, and say what it foretells.
@@ -205,7 +213,7 @@ class BiasExtension(CrossheadTest):
             alike = changes.keys() == with_these.keys() and all(
                 abs(changes[n] - v) <= SETTLED * abs(v) for n, v in with_these.items()
             )
-            if alike and self._strips.apart(curve, known) < SETTLED:
+            if alike and known.apart(curve) < SETTLED:
                 return
         place = (
             f"where a fit ended with {', '.join(sorted(v.label for v in key)) or 'the baseline'}"
@@ -373,6 +381,10 @@ class BiasExtension(CrossheadTest):
             },
         )
 
+    def _known(self, force: Varying) -> dict[str, Callable[[], Varying]]:
+        """The force of the strip also where its angle is read."""
+        return super()._known(self._pull)
+
     def _correction(self, variants: Sequence[Variant], travel: Any, which: int) -> Varying:
         """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
         off, D = self._corrections.get(_solved_by(variants)), travel["D"]
@@ -383,10 +395,6 @@ class BiasExtension(CrossheadTest):
             np.stack([own[which](at[:, r], k) for r, own in enumerate(off)], axis=1) for k in (0, 1)
         )
         return Varying(value, {p: change * slope for p, slope in D.slopes.items()})
-
-    def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
-        """Nothing: there are no such terms of a strip; see Experiment."""
-        raise NotImplementedError(variant.label)
 
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
         """Mean shear angle of the middle zone at every reading [degrees], (n,)."""

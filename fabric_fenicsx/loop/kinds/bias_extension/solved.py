@@ -78,10 +78,35 @@ class Way:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solved:
-    """The strips of all runs, solved with one curve."""
+    """The strips of all runs, solved with one curve.
+
+    Attributes:
+        curve: of their crossings.
+        ways: of each run.
+        passed: angles of all groups at some travels of all runs [rad], (n,).
+        weight: A dγ/dD there, (n,).
+        work: that times the curve's moments, (n,).
+    """
 
     curve: Curve
     ways: tuple[Way, ...]
+    passed: Array
+    weight: Array
+    work: Array
+
+    @classmethod
+    def along(cls, curve: Curve, ways: Sequence[Way], furthest: Array) -> Solved:
+        """The same, from the travels that the strips went to [mm], (n_runs,)."""
+        every = [(way, np.linspace(0.0, D, TRAVELS)) for way, D in zip(ways, furthest, strict=True)]
+        passed = np.concatenate([way.gamma(D).ravel() for way, D in every])
+        weight = np.concatenate([(way.area * way.gamma(D, 1)).ravel() for way, D in every])
+        return cls(curve, tuple(ways), passed, weight, weight * curve(passed))
+
+    def apart(self, curve: Curve) -> float:
+        """By how much of its work a curve differs from the one that strips were solved with."""
+        mine = self.weight * curve(self.passed)
+        total = float(np.abs(mine).sum())
+        return float(np.abs(mine - self.work).sum()) / max(total, 1e-300)
 
 
 def number(value: float, slopes: Mapping[str, Any] = MappingProxyType({})) -> Varying:
@@ -163,7 +188,7 @@ class SolvedStrips:
         for k, one in zip(lacking, self.solve([wanted[k] for k in lacking]), strict=True):
             changes, curve = wanted[k]
             known = [other for other in self._known.get(_key(changes), []) if other is not one]
-            before = min(known, key=lambda other: self.apart(curve, other), default=None)
+            before = min(known, key=lambda other: other.apart(curve), default=None)
             if isinstance(one, SolveError):
                 self.failed[_key(changes)] = str(one)
                 if before is None:
@@ -183,19 +208,9 @@ class SolvedStrips:
             if enough:
                 raise SolveError(self.failed[key])
             return None
-        apart = [self.apart(curve, one) for one in known]
+        apart = [one.apart(curve) for one in known]
         near = enough or curve.idle or min(apart) < NEAR
         return known[int(np.argmin(apart))] if near else None
-
-    def apart(self, curve: Curve, solved: Solved) -> float:
-        """By how much of its work a curve differs from the one that strips were solved with."""
-        differs = total = 0.0
-        for way, furthest in zip(solved.ways, self._furthest, strict=True):
-            D = np.linspace(0.0, furthest, TRAVELS)
-            mine, other = way.work(D, curve), way.work(D, solved.curve)
-            differs += float(np.abs(mine - other).sum())
-            total += float(np.abs(mine).sum())
-        return differs / max(total, 1e-300)
 
     def _surprise(self, found: Solved, before: Solved) -> float:
         """By how much strips differ from what others had foretold of their curve."""
@@ -220,10 +235,8 @@ class SolvedStrips:
             whole.append(path)
         if self._groups is None:
             self._groups = [_alike(path) for path in whole]
-        return Solved(
-            curve,
-            tuple(_way(*one, curve) for one in zip(whole, self._groups, strict=True)),
-        )
+        ways = [_way(*one, curve) for one in zip(whole, self._groups, strict=True)]
+        return Solved.along(curve, ways, self._furthest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

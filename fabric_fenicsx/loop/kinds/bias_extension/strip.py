@@ -18,7 +18,7 @@ from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PPoly
 
 from ...._dolfinx import Function
 from ....errors import InputError
@@ -69,11 +69,7 @@ class Curve:
 
     def __call__(self, gamma: Array) -> Array:
         """At shear angles [rad]."""
-        cubics = PchipInterpolator(np.radians(KNOTS), self.moments)
-        last = np.radians(KNOTS[-1])
-        size = np.abs(gamma)
-        beyond = np.maximum(size - last, 0.0) * float(cubics.derivative()(last))
-        return np.asarray(np.sign(gamma) * (cubics(np.minimum(size, last)) + beyond))
+        return np.asarray(np.sign(gamma) * _cubics(self)(np.abs(gamma)))
 
     @property
     def idle(self) -> bool:
@@ -85,6 +81,13 @@ class Curve:
         return TabulatedSpring(
             tuple(np.radians(KNOTS).tolist()), tuple(area * m for m in self.moments)
         )
+
+
+@lru_cache(maxsize=64)
+def _cubics(curve: Curve) -> PPoly:
+    """Of a curve's moments, with the straight piece behind the last knot."""
+    knots, coefficients = curve.law(1.0).numbers_of_cubics()
+    return PPoly(np.reshape(coefficients, (len(knots), -1)).T, [*knots, knots[-1] + 1.0])
 
 
 @dataclass(frozen=True, slots=True)
