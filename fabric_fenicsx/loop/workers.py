@@ -12,8 +12,10 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from multiprocessing.connection import Connection, Pipe, wait
-from subprocess import DEVNULL, Popen
+from subprocess import DEVNULL, Popen, TimeoutExpired
+from time import monotonic
 from typing import Any
 
 from ..errors import SolveError
@@ -21,8 +23,8 @@ from ..parallel import launched, world
 
 __all__ = ["each_of", "serve"]
 
-#: Seconds that a worker has to end by itself.
-PATIENCE = 5.0
+#: Seconds that workers have to end by themselves, then when they have been told to.
+PATIENCE = (0.5, 5.0)
 
 _COMMAND = "from fabric_fenicsx.loop.workers import serve; serve()"
 _workers: list[_Worker] = []
@@ -101,7 +103,7 @@ def serve() -> None:
             function, task = connection.recv()
             connection.send(_done(function, task))
     except (EOFError, OSError, KeyboardInterrupt):
-        pass
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
 
 
 def _done(function: Callable[..., Any], task: tuple[Any, ...]) -> Any:
@@ -122,13 +124,14 @@ def _cores() -> int:
 
 @atexit.register
 def _end() -> None:
-    """End all workers."""
+    """End all workers: those that do nothing see that nobody is there any more."""
     ended = [_workers.pop() for _ in range(len(_workers))]
     for worker in ended:
         worker.connection.close()
-        worker.process.terminate()
-    for worker in ended:
-        try:
-            worker.process.wait(PATIENCE)
-        except Exception:
-            worker.process.kill()
+    for seconds, more in zip(PATIENCE, (Popen.terminate, Popen.kill), strict=True):
+        until = monotonic() + seconds
+        for process in (worker.process for worker in ended):
+            with suppress(TimeoutExpired):
+                process.wait(max(until - monotonic(), 0.0))
+        for process in (worker.process for worker in ended):
+            more(process)

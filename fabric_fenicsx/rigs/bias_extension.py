@@ -7,6 +7,7 @@ hold places and turns of the tows' ends in them, all else is free.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -163,8 +164,16 @@ def slip_limit(case: BiasExtensionCase) -> float | None:
     return limit * (warp * weft / (case.warp_spacing_mm * case.weft_spacing_mm))
 
 
-def build(case: BiasExtensionCase, session: Session) -> Model:
-    """The model of a strip. Collective."""
+def build(
+    case: BiasExtensionCase, session: Session, travel: Callable[[float], float] | None = None
+) -> Model:
+    """The model of a strip. Collective.
+
+    Args:
+        case: of the strip.
+        session: where and how it runs.
+        travel: of the crosshead [mm] at a time [s]; by default the case's.
+    """
     from ..solving.model import Support
     from .common import fabric_model, tow_net
 
@@ -173,7 +182,8 @@ def build(case: BiasExtensionCase, session: Session) -> Model:
     every = (0, 1, 2, 3, 4, 5)
 
     def pulled(time: float) -> Array:
-        return np.tile([0.0, crosshead(case, time), 0.0], (len(upper), 1))
+        place = crosshead(case, time) if travel is None else travel(time)
+        return np.tile([0.0, place, 0.0], (len(upper), 1))
 
     shares = case.strip.shares(net.points[net.crossings[:, 0]], case.spacings)
     crossover = case.crossover.model_copy(update={"slip_limit_N": slip_limit(case)})

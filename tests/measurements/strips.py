@@ -50,23 +50,19 @@ def pulled(length, times, places, *, law, laws=(), steps=60, readings=121, tow=N
         }
     )
     session = Session(Path(), MPI.COMM_SELF, Path(), perf_counter(), laws=tuple(laws))
-    follows, rig.crosshead = rig.crosshead, lambda _, t: float(np.interp(t, times, places))
-    try:
-        model = rig.build(case, session)
-        upper, middle = rig.clamps(model.net, case)[1], rig.middle_zone(model.net, case)[0]
-        rows = [(0.0, 0.0, 0.0)]
+    model = rig.build(case, session, lambda time: float(np.interp(time, times, places)))
+    upper, middle = rig.clamps(model.net, case)[1], rig.middle_zone(model.net, case)[0]
+    rows = [(0.0, 0.0, 0.0)]
 
-        def observe(one):
-            angle = model.snapshot(one.time).shear_angle[middle].mean()
-            rows.append((one.time, model.reactions()[upper, 1].sum(), np.degrees(angle)))
+    def observe(one):
+        angle = model.snapshot(one.time).shear_angle[middle].mean()
+        rows.append((one.time, model.reactions()[upper, 1].sum(), np.degrees(angle)))
 
-        newton = model.newton(force_tolerance=1e-4, limit=25)
-        stepper = Stepper(model, newton, control(case.solver), observe=observe)
-        for corner in times[1:]:
-            stepper.run(float(corner))
-            stepper.predictor.forget()
-    finally:
-        rig.crosshead = follows
+    newton = model.newton(force_tolerance=1e-4, limit=25)
+    stepper = Stepper(model, newton, control(case.solver), observe=observe)
+    for corner in times[1:]:
+        stepper.run(float(corner))
+        stepper.predictor.forget()
     time, force, angle = np.array(rows).T
     at = np.linspace(0.0, times[-1], readings)
     return {

@@ -59,5 +59,7 @@ BIAS_EXTENSION = Kind(
     besides={"shear_angle_deg": "shear angle of the middle [°]"},
     mistakes=_mistakes,
     experiment=called_later(f"{__name__}.model", "BiasExtension"),
+    made_up=called_later(f"{__name__}.made_up", "made_up"),
+    options=("rates", "lengths", "angle_noise"),
     needs_others=True,
 )
