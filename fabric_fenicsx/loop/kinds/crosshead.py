@@ -60,6 +60,7 @@ class CrossheadTest:
 
     quantity = "force_N"
     notes: Sequence[str] = ()
+    alike: frozenset[str] = frozenset()
     listed: ClassVar[tuple[Effect, ...]] = ()
     """The effects of this test."""
 

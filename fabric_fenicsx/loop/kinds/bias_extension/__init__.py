@@ -61,5 +61,6 @@ BIAS_EXTENSION = Kind(
     experiment=called_later(f"{__name__}.model", "BiasExtension"),
     made_up=called_later(f"{__name__}.made_up", "made_up"),
     options=("rates", "lengths", "angle_noise"),
+    proposals=called_later(f"{__name__}.proposals", "proposals"),
     needs_others=True,
 )

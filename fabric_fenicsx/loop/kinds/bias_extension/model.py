@@ -31,6 +31,7 @@ from ...inference.experiment import Readings
 from ...measurement.schema import Measurement, Run
 from ..crosshead import CrossheadTest, shifted
 from ..drape.shear_field import hermite_weights
+from ..picture_frame.model import SAME_RATE
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
@@ -75,6 +76,7 @@ class BiasExtension(CrossheadTest):
     ) -> None:
         self._corrections: dict[frozenset[Variant], _Correction] = {}
         self._settled: dict[frozenset[Variant], tuple[Solved, dict[str, Any]]] = {}
+        self._like = like
         #: What a law that nothing was fitted of foretells; see frame_law.foretold.
         self.foretold: dict[str, float] = {}
         #: Force of the strips as it was last foretold [N], also where angles are read.
@@ -87,6 +89,25 @@ class BiasExtension(CrossheadTest):
     def terms(self) -> list[Effect]:
         """Terms without a formula over what the fitted readings reached."""
         return strip_terms(self._ranges())
+
+    @cached_property
+    def alike(self) -> frozenset[str]:  # type: ignore[override]
+        """Laws of the crossings, where all readings are of one way out at one speed.
+
+        Each of them is then a curve of the angle, whatever else it depends on.
+        """
+        speed = self._at_readings(self._points["D_rate"].value)[self.readings.fit]
+        if np.ptp(speed) > SAME_RATE * float(np.abs(speed).max()):
+            return frozenset()
+        every = (*self.effects, *self.terms)
+        return frozenset(
+            e.name for e in every if all(getattr(v, "laws", None) is not None for v in e.variants)
+        )
+
+    @property
+    def curve(self) -> Curve:
+        """The curve of the crossings that the strips of the last model were solved with."""
+        return self._mixture[0].solved.curve
 
     def take(self, fabric: FabricFile) -> None:
         """Take what a picture frame found, as a further form of locking, and say what it foretells.
@@ -145,8 +166,11 @@ class BiasExtension(CrossheadTest):
         ]
         rates = 2.0 * np.array(angles) / self._furthest * speed[self._parent]
         self._typical_rate = float(np.nanmedian(rates))
-        self._strips = SolvedStrips(runs, self._furthest, self._speed)
-        first = self._strips.solved({}, first_curve(self._of_forces()))
+        like = self._like
+        paths = {} if like is None else like._strips.paths
+        self._strips: SolvedStrips = SolvedStrips(runs, self._furthest, self._speed, paths)
+        suggested = first_curve(self._of_forces()) if like is None else like.curve
+        first = self._strips.solved({}, suggested)
         self._mixture = [Part(first, number(1.0))]
         self._reached = reached(first, self._furthest)
         self._reached /= float(self._reached @ first.curve.moments)

@@ -20,7 +20,7 @@ from ...measurement.readings import common_noise
 from ...measurement.schema import Measurement, Run
 from .strip import KNOTS, Curve
 
-__all__ = ["ANGLE", "ReadTogether", "first_curve", "read_together", "strip_of"]
+__all__ = ["ANGLE", "ReadTogether", "first_curve", "force_noise", "read_together", "strip_of"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -90,11 +90,7 @@ def read_together(measurements: Sequence[Measurement]) -> ReadTogether:
     sigma = float(np.sqrt(np.mean(np.square(stated)))) if stated else _rough(every, ANGLE)
     if not stated:
         sigma = max(np.nan_to_num(sigma), LEAST_ANGLE)
-    noise = common_noise(measurements)
-    if noise is None:
-        largest = max(float(np.nanmax(np.abs(r.columns["force_N"]), initial=0.0)) for _, r in every)
-        noise = max(float(np.nan_to_num(_rough(every, "force_N"))), LEAST_FORCE * largest) or 1.0
-    unit = noise / sigma
+    unit = force_noise(measurements) / sigma
     read = [[run for run in m.runs if _count(run, ANGLE) >= FEWEST] for m in measurements]
     angles = [
         replace(m, runs=tuple(_angles(run, unit) for run in runs))
@@ -107,6 +103,16 @@ def read_together(measurements: Sequence[Measurement]) -> ReadTogether:
         unit,
         (sigma, bool(stated)),
     )
+
+
+def force_noise(measurements: Sequence[Measurement]) -> float:
+    """One sigma of a force [N], as it is given or as neighbouring readings differ."""
+    noise = common_noise(measurements)
+    if noise is not None:
+        return noise
+    every = [(m, run) for m in measurements for run in m.runs]
+    largest = max(float(np.nanmax(np.abs(r.columns["force_N"]), initial=0.0)) for _, r in every)
+    return max(float(np.nan_to_num(_rough(every, "force_N"))), LEAST_FORCE * largest) or 1.0
 
 
 def _count(run: Run, column: str) -> int:

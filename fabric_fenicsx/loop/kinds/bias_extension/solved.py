@@ -121,8 +121,10 @@ class SolvedStrips:
         runs: with their measurements.
         furthest: travel that each strip is solved up to [mm], (n_runs,).
         speed: at which [mm/s], (n_runs,).
+        paths: of strips that were solved before, by their case and curve; is added to.
 
     Attributes:
+        paths: as given.
         failed: why strips stopped before their end, by what was changed.
         surprises: root mean squares by which strips differed from what others had foretold of
             their curve, shares of the force.
@@ -130,11 +132,16 @@ class SolvedStrips:
     """
 
     def __init__(
-        self, runs: Sequence[tuple[Measurement, Run]], furthest: Array, speed: Array
+        self,
+        runs: Sequence[tuple[Measurement, Run]],
+        furthest: Array,
+        speed: Array,
+        paths: dict[tuple[str, Curve], StripPath],
     ) -> None:
         self._runs, self._furthest, self._speed = list(runs), furthest, speed
         self._groups: list[npt.NDArray[np.int64]] | None = None
         self._known: dict[str, list[Solved]] = {}
+        self.paths = paths
         self.failed: dict[str, str] = {}
         self.surprises: list[float] = []
         self.count = 0
@@ -152,13 +159,17 @@ class SolvedStrips:
             for (m, run), travel, pace in zip(self._runs, self._furthest, self._speed, strict=True):
                 case = strip_case(m, run, float(travel), float(pace), changes, steps)
                 own.append((case.model_dump_json(), curve))
-                tasks.setdefault(own[-1], (case, curve))
+                if own[-1] not in self.paths:
+                    tasks.setdefault(own[-1], (case, curve))
             places.append(own)
         order = sorted(tasks, key=lambda key: -tasks[key][0].length_mm * tasks[key][0].width_mm)
-        paths = dict(zip(order, each_of(solved_strip, [tasks[key] for key in order]), strict=True))
+        stopped: dict[tuple[str, Curve], Exception] = {}
+        results = each_of(solved_strip, [tasks[key] for key in order])
+        for key, path in zip(order, results, strict=True):
+            (stopped if isinstance(path, Exception) else self.paths)[key] = path
         found = []
         for (changes, curve), own in zip(wanted, places, strict=True):
-            one = self._gathered(curve, [paths[key] for key in own])
+            one = self._gathered(curve, [stopped.get(key) or self.paths[key] for key in own])
             if isinstance(one, Solved):
                 self.count += 1
                 if steps == STEPS:
