@@ -29,13 +29,14 @@ from ...expressions.marching import Varying
 from ...inference.effects import Effect, Variant
 from ...inference.experiment import Readings
 from ...measurement.schema import Measurement, Run
-from ..crosshead import CrossheadTest, shifted
+from ..crosshead import CrossheadTest
 from ..drape.shear_field import hermite_weights
 from ..picture_frame.model import SAME_RATE
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
+from ..records import shifted
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
-from .frame_law import crossing_laws, foretold, locking_variant
+from .frame_law import crossing_laws, foretold, foretold_in_words, locking_variant
 from .quantities import first_curve, read_together, strip_of
 from .solved import GROUPS, Part, Solved, SolvedStrips, Wanted, gamma_of, number, of_ways, reached
 from .strip import FINE_STEPS, KNOTS, Curve, strip_case
@@ -430,38 +431,8 @@ class BiasExtension(CrossheadTest):
     @property
     def notes(self) -> list[str]:  # type: ignore[override]
         """What a report must say of the model."""
-        found = [
-            f"The strips were solved {self._strips.count} times, with curves m(γ) of their "
-            "crossings; in between forces follow to first order, with the angles as they were. "
-            "Where fits end they are solved as they are."
-        ]
-        if len(self._strips.surprises) > 1:
-            off = 100.0 * float(np.median(self._strips.surprises))
-            found.append(
-                f"That foretold the forces of the next strips to {off:.2g} % rms in the median."
-            )
-        if self.foretold:
-            told = [f"{self.foretold['error']:.2g} N rms"]
-            told += [
-                f"{self.foretold[part]:.2g} of the force in the {words} third of the travel"
-                for part, words in (("early", "first"), ("late", "last"))
-                if part in self.foretold
-            ]
-            found.append(
-                "The law that the picture frame found, whole and with nothing fitted, foretells "
-                f"these strips, pinned, to {', '.join(told)}."
-            )
-        if self._angles.any():
-            sigma, given = self._together.sigma
-            found.append(
-                f"Mean angles of the middle are fitted with the forces, as {sigma:.2g} degrees are "
-                f"{'given' if given else 'taken'} for their noise; they are the model's of all "
-                "crossings whose two tows end in no clamp."
-            )
-        found += [
-            f"{key or 'pinned'}: {why}; left out." for key, why in self._strips.failed.items()
-        ]
-        return found
+        strips, angles = self._strips, self._together.notes
+        return [*strips.notes, *foretold_in_words(self.foretold), *angles, *strips.left_out]
 
 
 def _solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:

@@ -56,6 +56,18 @@ class ReadTogether:
         """Runs of angles, (n_runs,)."""
         return np.arange(len(self.parent)) > self.parent
 
+    @property
+    def notes(self) -> list[str]:
+        """What a report must say of angles, if there are any."""
+        if not self.angles.any():
+            return []
+        sigma, given = self.sigma
+        return [
+            f"Mean angles of the middle are fitted with the forces, as {sigma:.2g} degrees are "
+            f"{'given' if given else 'taken'} for their noise; they are the model's of all "
+            "crossings whose two tows end in no clamp."
+        ]
+
     def named(self, readings: Readings) -> Readings:
         """The readings of all runs, with what they are and which specimen they are of."""
         rows = self.angles[readings.run]

@@ -146,6 +146,26 @@ class SolvedStrips:
         self.surprises: list[float] = []
         self.count = 0
 
+    @property
+    def notes(self) -> list[str]:
+        """How often strips were solved, and how well the ones before had foretold them."""
+        found = [
+            f"The strips were solved {self.count} times, with curves m(γ) of their "
+            "crossings; in between forces follow to first order, with the angles as they were. "
+            "Where fits end they are solved as they are."
+        ]
+        if len(self.surprises) > 1:
+            off = 100.0 * float(np.median(self.surprises))
+            found.append(
+                f"That foretold the forces of the next strips to {off:.2g} % rms in the median."
+            )
+        return found
+
+    @property
+    def left_out(self) -> list[str]:
+        """Strips that stopped before their end."""
+        return [f"{key or 'pinned'}: {why}; left out." for key, why in self.failed.items()]
+
     def solve(self, wanted: Sequence[Wanted], steps: int = STEPS) -> list[Solved | SolveError]:
         """Sets of strips; with few steps, kept for others near by.
 

@@ -25,7 +25,8 @@ from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect
 from ...inference.experiment import OneCurve
 from ...measurement.schema import Measurement, Run
-from ..crosshead import CrossheadTest, shifted
+from ..crosshead import CrossheadTest
+from ..records import shifted
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
 from .terms import terms
