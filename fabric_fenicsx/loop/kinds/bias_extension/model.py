@@ -385,19 +385,13 @@ class BiasExtension(CrossheadTest):
     ) -> Varying:
         self._mixture = self._mixed(variants, values)
         whole = super()._force(travel, variants, values)
-        found = (
-            whole
-            + of_ways(self._mixture, travel["D"], "rest")
-            + self._correction(variants, travel, 0)
-        )
+        rest, middle = (of_ways(self._mixture, travel["D"], name) for name in ("rest", "middle"))
+        found = self._pull = whole + rest + self._correction(variants, travel, 0)
         if not self._angles.any():
             return found
         # Of runs of angles nothing else counts.
         degree = np.asarray(np.degrees(self._together.unit))
-        middle = of_ways(self._mixture, travel["D"], "middle") + self._correction(
-            variants, travel, 1
-        )
-        angles = middle * Varying(degree)
+        angles = (middle + self._correction(variants, travel, 1)) * Varying(degree)
         return Varying(
             np.where(self._angles, angles.value, found.value),
             {
