@@ -91,7 +91,9 @@ workers.each_of(time.sleep, [(3.0,)] * 4)
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)]
+)
 def test_workers_end_with_whoever_asks(number):
     """At once on Ctrl-C; where it has no time to end them, when their task is done."""
     asking = subprocess.Popen(
