@@ -48,6 +48,11 @@ def test_terms_of_a_strip_are_those_that_it_can_show():
     assert {t.test for t in strip_terms(RANGES)} == {"bias_extension"}
 
 
+def test_angles_alone_have_no_terms():
+    test = BiasExtension([with_angles(of_runs(run_of(force=np.full(29, np.nan))))])
+    assert test.terms == [] and "shear_locking" in test.alike
+
+
 def test_a_term_is_shown_along_what_the_crossings_felt(back):
     """The largest angle so far is that of the crossings that are sheared most."""
     variant = term(back, "elastic_moment_of_largest_angle", "largest angle, linear")

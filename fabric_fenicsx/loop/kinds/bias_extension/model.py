@@ -88,8 +88,9 @@ class BiasExtension(CrossheadTest):
 
     @cached_property
     def terms(self) -> list[Effect]:
-        """Terms without a formula over what the fitted readings reached."""
-        return strip_terms(self._ranges())
+        """Terms without a formula over what the fitted readings reached; none without forces."""
+        forces = self.readings.fit & self.readings.first
+        return strip_terms(self._ranges()) if forces.any() else []
 
     @cached_property
     def alike(self) -> frozenset[str]:  # type: ignore[override]
