@@ -169,8 +169,13 @@ def constants_per_cell(mesh: Any, size: int) -> Any:
     return _space(mesh, "DG", 0, size)
 
 
-def constant(mesh: Any, value: float | tuple[float, ...]) -> Any:
-    """A number or vector that forms on ``mesh`` read when assembled, from its ``.value``."""
+def constant(mesh: Any, value: Any) -> Any:
+    """A number or vector that forms on ``mesh`` read when assembled, from its ``.value``.
+
+    One that is such a constant already stays what it is.
+    """
+    if isinstance(value, fem.Constant):
+        return value
     return fem.Constant(
         mesh,
         PETSc.ScalarType(value)

@@ -52,6 +52,7 @@ class Linear:
 
     test, quantity, notes, one_curve = "linear", "force_N", (), None
     curves_only = False
+    alike = frozenset()
 
     def __init__(self, data, columns, baseline, *, effects=(), noise=None):
         self.readings, self.columns = data, columns

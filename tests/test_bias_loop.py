@@ -8,10 +8,9 @@ import pytest
 import yaml
 from scipy.interpolate import PchipInterpolator
 
-import fabric_fenicsx.loop.kinds.bias_extension.model as loop
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
-from fabric_fenicsx.loop.kinds.bias_extension import BIAS_EXTENSION, BiasExtensionRig
+from fabric_fenicsx.loop.kinds.bias_extension import BIAS_EXTENSION, BiasExtensionRig, solved
 from fabric_fenicsx.loop.kinds.bias_extension.frame_law import (
     LIKE_THE_FRAME,
     locking,
@@ -85,10 +84,10 @@ def test_forces_are_those_of_the_net(strip):
 def test_another_law_is_foretold_to_first_order(strip, monkeypatch):
     """Halved changes of the law leave a quarter of the error: no strip is solved in between."""
     strip.predict((), VALUES)
-    monkeypatch.setattr(loop, "NEAR", 1e3)
-    monkeypatch.setattr(loop, "MOST", 0)
-    known = strip._solved[""]
-    monkeypatch.setitem(strip._solved, "", [known[-1]])
+    monkeypatch.setattr(solved, "NEAR", 1e3)
+    monkeypatch.setattr(solved, "MOST", 0)
+    known = strip._strips._known
+    monkeypatch.setitem(known, "", [known[""][-1]])
     off = []
     base, _ = strip.predict((), VALUES)
     for share in (2.0, 1.0):
@@ -128,7 +127,7 @@ def test_slopes_are_differences(effect, label, monkeypatch):
     for p in variant.parameters:
         values[p.name] = p.starts[0] if p.starts else 0.1
     _, slopes = test.predict((variant,), values)
-    monkeypatch.setattr(loop, "MOST", 0)
+    monkeypatch.setattr(solved, "MOST", 0)
     for name in ("k3_N", *(p.name for p in variant.parameters)):
         h = 1e-5 * abs(values[name])
         up, down = (test.predict((variant,), values | {name: values[name] + s})[0] for s in (h, -h))

@@ -27,6 +27,7 @@ class Lines:
 
     test, quantity, effects, notes, one_curve = "lines", "force_N", (), (), None
     curves_only = False
+    alike = frozenset()
     noise = SIGMA
     baseline = (Parameter("a_N", (1.0,)), Parameter("b_N", (1.0,)))
 

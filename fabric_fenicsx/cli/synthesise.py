@@ -40,7 +40,24 @@ def synthesise(
             "--rates",
             metavar="X,X",
             help="Of the crosshead [mm/min], a run for each, the last one held out; default: the "
-            "case's, ten times and three times that",
+            "case's, ten times and, in a picture frame, three times that",
+        ),
+    ] = None,
+    lengths: Annotated[
+        str | None,
+        typer.Option(
+            "--lengths",
+            metavar="X,X",
+            help="Of a strip [mm], each pulled at every rate; default: the case's and 1.25 times "
+            "that.",
+        ),
+    ] = None,
+    angle_noise: Annotated[
+        float | None,
+        typer.Option(
+            "--angle-noise",
+            metavar="X",
+            help="Of a strip: one sigma of its shear angle [°], which is then read as well.",
         ),
     ] = None,
     cells: Annotated[
@@ -103,7 +120,9 @@ def synthesise(
                 effect or [],
                 noise,
                 {
-                    "rates": _numbers(rates) or None,
+                    "rates": _numbers("rates", rates) or None,
+                    "lengths": _numbers("lengths", lengths) or None,
+                    "angle_noise": angle_noise,
                     "cells": cells,
                     "spacing": spacing,
                     "model": model,
@@ -158,8 +177,8 @@ def _write(
     return made.effects
 
 
-def _numbers(text: str | None) -> list[float]:
-    """The rates of --rates."""
+def _numbers(option: str, text: str | None) -> list[float]:
+    """The numbers of an option."""
     found = []
     for part in text.split(",") if text is not None else []:
         try:
@@ -167,5 +186,5 @@ def _numbers(text: str | None) -> list[float]:
         except ValueError:
             found.append(0.0)
         if not 0.0 < found[-1] < float("inf"):
-            raise InputError(f"--rates: {part.strip()!r}, allowed are numbers more than 0")
+            raise InputError(f"--{option}: {part.strip()!r}, allowed are numbers more than 0")
     return found

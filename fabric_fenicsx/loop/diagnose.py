@@ -24,7 +24,7 @@ from .kinds import KINDS
 from .measurement.kind import Kind
 from .measurement.reading import read_folder
 from .measurement.schema import Measurement
-from .own_effects import read_effects
+from .own_effects import of_test, read_effects
 from .report.content import combined_report, test_report
 from .report.discovered import Discovered, discovered_terms
 from .report.page import write_report
@@ -156,10 +156,9 @@ def _experiments(
     for kind in KINDS:
         same = [m for m in measurements if m.test == kind.name]
         if same:
-            mine = [effect for effect in own if effect.test == kind.name]
             try:
                 model = models.get(kind.name, kind.experiment)
-                tests.append((kind, same, model(same, mine)))
+                tests.append((kind, same, model(same, of_test(own, kind.name))))
             except SolveError as error:
                 raise _unfitted(kind, error) from error
     for _, _, experiment in tests:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
@@ -12,9 +13,9 @@ from ..mechanics.laws.law import CrossingLaw
 from ..mechanics.laws.trial import try_out
 from .inference.effects import Effect, Variant
 from .kinds import KINDS
-from .kinds.picture_frame.variant import law_effects
+from .kinds.picture_frame.variant import FrameVariant, law_effects
 
-__all__ = ["read_effects"]
+__all__ = ["of_test", "read_effects"]
 
 
 def read_effects(path: Path) -> list[Effect]:
@@ -65,3 +66,16 @@ def read_effects(path: Path) -> list[Effect]:
                     "unless it is an amplitude"
                 )
     return effects
+
+
+def of_test(effects: Sequence[Effect], test: str) -> list[Effect]:
+    """Those of a test. What laws of a crossing do in a picture frame they do in a strip as well."""
+    found = [effect for effect in effects if effect.test == test]
+    if test == "bias_extension":
+        names = [effect.name for effect in found]
+        found += [replace(e, test=test) for e in effects if e.name not in names and _of_laws(e)]
+    return found
+
+
+def _of_laws(effect: Effect) -> bool:
+    return all(isinstance(v, FrameVariant) and v.laws is not None for v in effect.variants)

@@ -23,8 +23,10 @@ from .inference.experiment import Experiment
 from .inference.fitting import orthogonal_to
 from .inference.starts import SMALL
 from .kinds import KINDS, kind_of
+from .measurement.kind import Kind, MadeUp
 from .measurement.reading import write_folder
 from .measurement.schema import SCHEMA
+from .own_effects import of_test
 
 __all__ = ["Hidden", "Synthetic", "parse_effect", "synthesise", "write_measurement"]
 
@@ -120,7 +122,7 @@ def synthesise(
         having = [other.name for other in KINDS if option in other.options]
         if kind.name not in having:
             raise InputError(f"--{option}: allowed with test: {one_of(having)} only")
-    made = kind.made_up(case, place, noise, readings, seed, own, **of_kind)
+    made = kind.made_up(case, place, noise, readings, seed, of_test(own, case.test), **of_kind)
     experiment, measurement = made.experiment, made.measurement
     forms: list[Variant] = []
     put_in: list[Hidden] = []
@@ -136,17 +138,14 @@ def synthesise(
         forms.append(form)
         values |= own_values
         put_in.append(Hidden(effect.name, form.label, own_values))
-    expected, _ = experiment.predict(forms, values)
     rng = np.random.default_rng(seed)
+    sigmas = {kind.quantity: noise, **made.besides}
+    read = made.solved(forms, values) if made.solved else _predicted(made, kind, forms, values)
     tables = {}
-    for number, run in enumerate(measurement.runs):
-        rows = np.flatnonzero(experiment.readings.run == number)
-        if experiment.readings.row is not None:
-            rows = rows[np.argsort(experiment.readings.row[rows])]
-        columns = {**run.columns, **made.completed(run.columns, expected[rows])}
-        columns = {name: column[:: made.finer] for name, column in columns.items()}
-        exact = expected[rows][:: made.finer]
-        columns[kind.quantity] = exact + noise * rng.standard_normal(len(exact))
+    for run, found in zip(measurement.runs, read, strict=True):
+        columns = {name: c[:: made.finer] for name, c in {**run.columns, **found}.items()}
+        for name, sigma in sigmas.items():
+            columns[name] = columns[name] + sigma * rng.standard_normal(len(columns[name]))
         tables[run.file] = columns
     content = {
         "schema": SCHEMA,
@@ -154,13 +153,29 @@ def synthesise(
         "title": case.title or case.test.replace("_", " "),
         "fabric": measurement.fabric.model_dump(),
         "rig": measurement.rig.model_dump(),
-        "noise": {kind.quantity: noise},
+        "noise": sigmas,
         "runs": [
-            {"file": run.file, "role": "holdout" if run.holdout else "fit"}
+            {"file": run.file, "role": "holdout" if run.holdout else "fit", **run.own}
             for run in measurement.runs
         ],
     }
     return Synthetic(content, tables, put_in)
+
+
+def _predicted(
+    made: MadeUp, kind: Kind, forms: Sequence[Variant], values: Mapping[str, float]
+) -> list[dict[str, Array]]:
+    """What the experiment itself predicts of each run."""
+    readings = made.experiment.readings
+    expected, _ = made.experiment.predict(forms, values)
+    found = []
+    for number, run in enumerate(made.measurement.runs):
+        rows = np.flatnonzero(readings.run == number)
+        if readings.row is not None:
+            rows = rows[np.argsort(readings.row[rows])]
+        completed = made.completed(run.columns, expected[rows])
+        found.append({kind.quantity: expected[rows], **completed})
+    return found
 
 
 def write_measurement(folder: Path | str, synthetic: Synthetic) -> None:
@@ -171,8 +186,8 @@ def write_measurement(folder: Path | str, synthetic: Synthetic) -> None:
         OSError: it cannot be written.
     """
     content = synthetic.content
-    (noise,) = content["noise"].values()
-    write_folder(Path(folder), kind_of(content["test"]), content, noise, synthetic.tables)
+    kind = kind_of(content["test"])
+    write_folder(Path(folder), kind, content, content["noise"][kind.quantity], synthetic.tables)
 
 
 def _named(effects: Sequence[Effect], name: str, place: str) -> Effect:

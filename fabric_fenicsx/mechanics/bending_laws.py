@@ -23,7 +23,7 @@ from ufl import as_vector, exp, ln, max_value, min_value, tanh
 from ..inputs.groups import NotNegative
 from .fields import TowFields
 from .laws.law import Declared, number, signed, size_of
-from .laws.tabulated import check_table, cubics_of, evaluated
+from .laws.tabulated import check_table, cubics_of, evaluated, numbers_of
 from .section_laws import ElasticSection
 
 __all__ = [
@@ -178,12 +178,12 @@ class TabulatedBending(BendingLaw):
     def moment(self, kappa: Any, number: Number) -> Any:
         """The cubic of the interval that |κ| lies in, with the sign of κ."""
         cubics = cubics_of(self.curvatures, self.moments)
-        return signed(kappa, evaluated(cubics, size_of(kappa), number))
+        return signed(kappa, evaluated(numbers_of(cubics), size_of(kappa), number))
 
     def energy(self, kappa: Any, number: Number) -> Any:
         """∫ m dκ from 0 to |κ|."""
         quartics = cubics_of(self.curvatures, self.moments).antiderivative()
-        return evaluated(quartics, size_of(kappa), number)
+        return evaluated(numbers_of(quartics), size_of(kappa), number)
 
     def stiffness(self, number: Number) -> Any:
         """Slope of the first cubic at 0."""

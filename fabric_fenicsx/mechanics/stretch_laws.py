@@ -36,11 +36,11 @@ class Uncrimping:
     """How a tow's crimp softens its stretch; forces and energies are per EA.
 
     Attributes:
-        strain: ε_c [-], positive.
+        strain: ε_c [-], positive; a number or a constant of the form.
         share: r, of the stiffness while the crimp is drawn out [-], above 0.
     """
 
-    strain: float
+    strain: Any
     share: float
 
     def force(self, stretch: Any, number: Number) -> Any:
@@ -62,7 +62,8 @@ class Uncrimping:
 
     def _parts(self, stretch: Any, number: Number) -> tuple[Any, Any, Any]:
         """W, ε − ε_c within -w to w, and by how much it is beyond."""
-        w, past = number(self.strain / 2.0), stretch - number(self.strain)
+        strain = number(self.strain)
+        w, past = strain / 2, stretch - strain
         return w, max_value(min_value(past, w), -w), max_value(past - w, 0)
 
 

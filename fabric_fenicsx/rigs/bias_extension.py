@@ -7,6 +7,7 @@ hold places and turns of the tows' ends in them, all else is free.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -29,7 +30,16 @@ if TYPE_CHECKING:
     from ..solving.snapshot import Snapshot
     from .common import Session
 
-__all__ = ["RIG", "BiasExtensionCase", "build", "clamps", "middle_zone", "run", "waist"]
+__all__ = [
+    "RIG",
+    "BiasExtensionCase",
+    "build",
+    "clamps",
+    "middle_zone",
+    "run",
+    "slip_limit",
+    "waist",
+]
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -143,8 +153,27 @@ def clamps(net: Net, case: BiasExtensionCase) -> tuple[Integers, Integers]:
     return lower, upper
 
 
-def build(case: BiasExtensionCase, session: Session) -> Model:
-    """The model of a strip. Collective."""
+def slip_limit(case: BiasExtensionCase) -> float | None:
+    """Force at which a crossing of the net slips [N], None: never.
+
+    Where the edges want other spacings the fabric stays what it is: limits go with the area.
+    """
+    limit, (warp, weft) = case.crossover.slip_limit_N, case.spacings
+    if limit is None:
+        return None
+    return limit * (warp * weft / (case.warp_spacing_mm * case.weft_spacing_mm))
+
+
+def build(
+    case: BiasExtensionCase, session: Session, travel: Callable[[float], float] | None = None
+) -> Model:
+    """The model of a strip. Collective.
+
+    Args:
+        case: of the strip.
+        session: where and how it runs.
+        travel: of the crosshead [mm] at a time [s]; by default the case's.
+    """
     from ..solving.model import Support
     from .common import fabric_model, tow_net
 
@@ -153,14 +182,11 @@ def build(case: BiasExtensionCase, session: Session) -> Model:
     every = (0, 1, 2, 3, 4, 5)
 
     def pulled(time: float) -> Array:
-        return np.tile([0.0, crosshead(case, time), 0.0], (len(upper), 1))
+        place = crosshead(case, time) if travel is None else travel(time)
+        return np.tile([0.0, place, 0.0], (len(upper), 1))
 
     shares = case.strip.shares(net.points[net.crossings[:, 0]], case.spacings)
-    # Where the edges want other spacings the fabric stays what it is: limits go with the area.
-    limit, (warp, weft) = case.crossover.slip_limit_N, case.spacings
-    if limit is not None:
-        limit *= warp * weft / (case.warp_spacing_mm * case.weft_spacing_mm)
-    crossover = case.crossover.model_copy(update={"slip_limit_N": limit})
+    crossover = case.crossover.model_copy(update={"slip_limit_N": slip_limit(case)})
     return fabric_model(
         case.model_copy(update={"crossover": crossover}),
         net,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -92,6 +92,9 @@ class Model:
         extra: further terms, from the fields of the tows and of the connectors (None on a rank
             without crossings); returns as many terms on every rank.
         comm: communicator.
+
+    Attributes:
+        crimp_strain: of ``uncrimping``, a constant of the forms; None without it.
     """
 
     def __init__(
@@ -135,6 +138,10 @@ class Model:
         self.fields = self.disc.tows
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
         self._full_gravity, self._load = np.array(gravity), load
+        self.crimp_strain: Any = None
+        if uncrimping is not None:
+            self.crimp_strain = _dolfinx.constant(self.fields.mesh, uncrimping.strain)
+            uncrimping = replace(uncrimping, strain=self.crimp_strain)
         self.elastic = elastic_section(self.disc, sections, kind, section_law, bending, uncrimping)
         self._constants(mass_scale)
         self.histories = Histories(self.disc)

@@ -56,6 +56,9 @@ class Crossings:
         disc: the discretised net; it has crossings.
         law: what joins the tows.
         histories: where the laws' memories go.
+
+    Attributes:
+        slip_limit: of the law, a constant of the forms; None: never, or no crossings here.
     """
 
     def __init__(self, disc: Discretisation, law: CrossoverLaw, histories: Histories) -> None:
@@ -73,6 +76,8 @@ class Crossings:
 
         self._space = _dolfinx.constants_per_cell(fields.mesh, 1)
         self.per_time, self.rate_factor, self.extrapolated = map(number, (1.0, 1.0, 0.0))
+        limit = law.slip_limit
+        self.slip_limit = None if limit is None else number(limit)
         change = crossover.shear_angle_change(fields)
         gamma = variable(change.value)
         gamma_n, before = Function(self._space), Function(self._space)
@@ -114,16 +119,17 @@ class Crossings:
         """The translational springs; what they remember goes on the list."""
         name, fields, k = "translation springs", self.disc.connectors, number(law.translation)
         assert fields is not None
-        if law.slip_limit is None:
+        if self.slip_limit is None:
             return energy_term(name, fields, crossover.opening_energy(fields, k))
         slip_n = (Function(self._space), Function(self._space))
-        springs = slip.SlippingSprings(fields, k, number(law.slip_limit), slip_n)
+        springs = slip.SlippingSprings(fields, k, self.slip_limit, slip_n)
         for direction, past, new in zip(("along", "across"), slip_n, springs.slip(), strict=True):
             remembered.append((f"slip {direction} the warp", past, new))
         return springs.term(name)
 
     def _without_crossings(self, turning: Sequence[str], histories: Histories) -> None:
         """The same collective calls on a rank that has no crossing of its own."""
+        self.slip_limit = None
         names = ["translation springs", "normal alignment", *turning]
         self.terms = [Term(name, "crossovers", None, None) for name in names]
         self._remember(histories, [])

@@ -215,6 +215,11 @@ class Experiment(Protocol):
         """What all fitted readings are a function of, where the test cannot know more."""
         ...
 
+    @property
+    def alike(self) -> frozenset[str]:
+        """Names of effects that these readings cannot tell from each other, whatever their fits."""
+        ...
+
     def settle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """Make predictions near a model as good as they can be, where they are approximate."""
         ...

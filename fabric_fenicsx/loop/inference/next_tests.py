@@ -135,7 +135,11 @@ def _further(
     found = []
     for proposal in proposals:
         try:
-            found.append((proposal, kind.experiment([proposal.measurement], (), like=experiment)))
+            measured = [proposal.measurement]
+            if proposal.model is None:
+                found.append((proposal, kind.experiment(measured, (), like=experiment)))
+            else:
+                found.append((proposal, proposal.model(measured)))
         except SolveError:
             continue
     return found

@@ -534,7 +534,8 @@ class _Search:
                         self._weighed([(f, self._effects_of(f)) for f in fits])
                     )
                 best = min(known, key=lambda m: m.criterion, default=None)
-                if best is not None and self._near(best, final, own):
+                near = best is not None and self._near(best, final, own)
+                if near or {own.name, other.name} <= self.experiment.alike:
                     found[own.name].append(other.name)
         return found
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from math import inf
 from typing import Any, ClassVar
 
@@ -22,7 +21,6 @@ from scipy.optimize import nnls
 
 from ...inputs.parameters import Parameter
 from ...mechanics.laws.dashpots import LinearDashpot
-from ...mechanics.laws.law import Crossing
 from ...mechanics.laws.springs import PolynomialSpring
 from ...mechanics.scalars import derivative_of
 from ..expressions.marching import Marched, Varying
@@ -33,8 +31,9 @@ from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
+from .records import laid_out, of_a_crossing, typical
 
-__all__ = ["CrossheadTest", "of_a_crossing", "shifted"]
+__all__ = ["CrossheadTest"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -44,9 +43,6 @@ BASELINE = (
     Parameter("k3_N", (0.0,), 0.0, meaning="spring, moment per area and angle³"),
     Parameter("c1_N_s", (0.0,), 0.0, meaning="dashpot, moment per area and rate"),
 )
-
-#: Time step [s] to the first point of a record.
-BEFORE = 1e-9
 
 
 class CrossheadTest:
@@ -60,6 +56,7 @@ class CrossheadTest:
 
     quantity = "force_N"
     notes: Sequence[str] = ()
+    alike: frozenset[str] = frozenset()
     listed: ClassVar[tuple[Effect, ...]] = ()
     """The effects of this test."""
 
@@ -73,7 +70,7 @@ class CrossheadTest:
         self.baseline: tuple[Parameter, ...] = BASELINE
         runs = [(m, run) for m in measurements for run in m.runs]
         motions = [self._motion(m, run) for m, run in runs]
-        self._lay_out(motions)
+        self._points, self._place = laid_out(motions)
         self._compiled: dict[Any, Marched] = {} if like is None else like._compiled
         self._set_up(runs)
         known = self._kinematics(self._points, {})
@@ -98,7 +95,7 @@ class CrossheadTest:
             "rate": float(np.abs(rate).max()),
             # Not read yet where a run is to be made up.
             "force": float(np.abs(self.readings.observed[self.readings.first]).max()) or inf,
-            "typical_rate": _typical(np.abs(rate)),
+            "typical_rate": typical(np.abs(rate)),
             "travel": float(np.abs(self._points["D"].value).max()),
         }
         shares |= self._more_shares()
@@ -188,30 +185,6 @@ class CrossheadTest:
             replace(p, starts=(float(value),)) for p, value in zip(self.baseline, k, strict=True)
         )
 
-    def _lay_out(self, motions: Sequence[Motion]) -> None:
-        """Records side by side; the shorter ones rest at their last point."""
-        longest = max(len(p.time) for p in motions)
-        shape = (longest, len(motions))
-        time, D, rate = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-        places = []
-        for r, p in enumerate(motions):
-            count = len(p.time)
-            time[:count, r], D[:count, r], rate[:count, r] = p.time, p.displacement, p.rate
-            time[count:, r] = p.time[-1] + np.arange(1, longest - count + 1)
-            D[count:, r] = p.displacement[-1]
-            rows = np.flatnonzero(p.reading >= 0)
-            places.append((rows[np.argsort(p.reading[rows])], np.full(len(p.certain), r)))
-        self._place = tuple(np.concatenate(part) for part in zip(*places, strict=True))
-        step = np.diff(time, axis=0, prepend=time[:1])
-        # Nothing has happened before the first point.
-        step[0] = BEFORE
-        self._points = {
-            "time": Varying(time),
-            "D": Varying(D),
-            "D_rate": Varying(rate),
-            "per_time": Varying(1.0 / step),
-        }
-
     def _at_readings(self, values: Array) -> Array:
         return np.broadcast_to(values, self._points["D"].value.shape)[self._place]
 
@@ -222,6 +195,51 @@ class CrossheadTest:
 
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """None: the moment depends on the angle, its rate and its past; see Experiment."""
+
+    def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
+        """What a term without a formula depends on, at every reading; see Experiment."""
+        assert isinstance(variant, FrameVariant)
+        if variant.laws is None:
+            known = self._force(self._points, (), values)
+            return self._at_readings(self._known(known)[variant.of[0]]().value)
+        key = (variant, "along")
+        if key not in self._compiled:
+            names = tuple(p.name for p in variant.parameters) + variant.of_baseline
+            marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
+            law = variant.laws(marched.at)[0]
+            crossing = of_a_crossing(marched, 0)
+            history = {f"0 {n}": value for n, value in law.history(crossing).items()}
+            variable = law.variable_at(crossing)
+            self._compiled[key] = marched.define({"variable": variable}, history)
+        found = self._compiled[key](self._kinematics(self._points, {}), values)["variable"]
+        return self._shown(found.value)
+
+    def _ranges(self) -> dict[str, float]:
+        """Largest values in the fitted readings of what terms without a formula depend on.
+
+        By the names that picture_frame.terms has for them.
+        """
+        rows = self.readings.fit & self.readings.first
+
+        def most(values: Array) -> float:
+            return float(np.abs(values[rows]).max())
+
+        D, speed, time = (self._points[name].value for name in ("D", "D_rate", "time"))
+        change = np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0, prepend=0.0)
+        change[0] = 0.0
+        force = float(np.abs(self.readings.observed[rows]).max())
+        acceleration = self._per_second(self._points["D_rate"]).value
+        return {
+            "angle": most(self._gamma),
+            "rate": most(self._rate),
+            "path": most(self._shown(np.cumsum(np.abs(change), axis=0))),
+            "time": most(self._at_readings(time - time[0])),
+            "displacement": most(self._at_readings(D)),
+            "speed": most(self._at_readings(speed)),
+            "acceleration": most(self._at_readings(acceleration)),
+            "force": force,
+            "force_rate": force / max(float(np.median(time[-1])), 1e-9),
+        }
 
     def predict(
         self,
@@ -450,32 +468,3 @@ class CrossheadTest:
                 zeros.append((rows, J))
                 total[:, run] = sum(z * c for z, c in zip(zero, own.values(), strict=True))
         return Varying(total, found), zeros
-
-
-def _typical(rate: Array) -> float:
-    """Median of the rates [rad/s] while the frame moves."""
-    moving = rate[rate > 1e-6 * float(rate.max())]
-    return float(np.median(moving)) if len(moving) else 1.0
-
-
-def of_a_crossing(marched: Marched, number: int) -> Crossing:
-    """What one of several laws may use, in symbols."""
-    at = marched.at
-    return Crossing(
-        at["gamma"],
-        at["gamma_n"],
-        at["per_time"],
-        lambda value: value,
-        partial(_remembered, marched, number),
-        at["rate"],
-    )
-
-
-def _remembered(marched: Marched, number: int, name: str) -> Any:
-    """A memory of one of several laws, which may use the same names."""
-    return marched.remembered(f"{number} {name}")
-
-
-def shifted(values: Array) -> Array:
-    """At the point before; at the first point the value there."""
-    return np.concatenate([values[:1], values[:-1]])

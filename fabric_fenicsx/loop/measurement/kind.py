@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from ...inputs.groups import Keys
 from ...inputs.tables import Column
+from ..inference.effects import Variant
 from ..inference.experiment import Experiment
 from .proposal import Proposal
 from .schema import Measurement, RunKeys
@@ -41,6 +42,9 @@ class MadeUp:
             over noise, where its strength is not given.
         completed: columns that follow from what the model predicts, from a run's columns and
             that, (n,).
+        solved: from forms and values of all parameters to the columns that each run reads of a
+            fuller model than the experiment is; None: the experiment is the model.
+        besides: one sigma of further columns that are read.
     """
 
     measurement: Measurement
@@ -49,6 +53,8 @@ class MadeUp:
     finer: int
     visible: float
     completed: Callable[[Mapping[str, Array], Array], Mapping[str, Array]] = lambda *_: {}
+    solved: Callable[[Sequence[Variant], Mapping[str, float]], list[dict[str, Array]]] | None = None
+    besides: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

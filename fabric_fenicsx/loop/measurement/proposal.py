@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
+from ..inference.experiment import Experiment
 from .schema import Measurement, Run
 
-__all__ = ["Proposal", "proposed", "rounded", "typical_count"]
+__all__ = [
+    "DECIMALS",
+    "Leg",
+    "Proposal",
+    "proposed",
+    "rounded",
+    "travelled",
+    "typical_count",
+    "typical_speed",
+]
 
 Array = npt.NDArray[np.float64]
+
+#: Fewest intervals between readings on a leg: its rate is to be found from them.
+FEWEST = 10
+#: Decimals of times [s] and travels [mm]: as they are written.
+DECIMALS = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,12 +41,14 @@ class Proposal:
         columns: what is prescribed, as in a CSV of the run, (n,) each.
         new_specimen: whether a specimen that was not measured yet is needed, so that it differs
             from the others as specimens do.
+        model: of that measurement; None: its kind's own.
     """
 
     label: str
     measurement: Measurement
     columns: Mapping[str, Array]
     new_specimen: bool
+    model: Callable[[Sequence[Measurement]], Experiment] | None = None
 
     @property
     def summary(self) -> str:
@@ -47,6 +65,7 @@ def proposed(
     unknown: Mapping[str, Array],
     *,
     new_specimen: bool = True,
+    own: Mapping[str, float] = MappingProxyType({}),
 ) -> Proposal:
     """A further run of a measurement's rig and fabric.
 
@@ -56,8 +75,9 @@ def proposed(
         columns: what is prescribed, (n,) each.
         unknown: what is to be measured, (n,) each, with something in its place.
         new_specimen: see Proposal.
+        own: what only this kind's runs have.
     """
-    run = Run("next.csv", False, label, {**columns, **unknown})
+    run = Run("next.csv", False, label, {**columns, **unknown}, own=own)
     return Proposal(label, replace(like, runs=(run,)), columns, new_specimen)
 
 
@@ -69,3 +89,43 @@ def typical_count(measurements: Sequence[Measurement]) -> int:
 def rounded(value: float) -> float:
     """To two figures, as a laboratory would set it."""
     return float(f"{value:.2g}")
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A way of a crosshead at one speed [mm/s] to a place [mm], and a hold there [s]."""
+
+    place: float
+    speed: float
+    hold: float = 0.0
+
+
+def travelled(legs: Sequence[Leg], count: int) -> tuple[Array, Array]:
+    """Times [s] and travels [mm] of readings, as many on each leg and hold, at its ends too.
+
+    Args:
+        legs: from 0; from where it is already, a leg is no way.
+        count: of readings in all, or more of them on many legs.
+    """
+    corners, places = [0.0], [0.0]
+    for leg in legs:
+        way = abs(leg.place - places[-1])
+        for seconds in (way / leg.speed, leg.hold):
+            if seconds > 0.0:
+                corners.append(corners[-1] + seconds)
+                places.append(leg.place)
+    pieces = len(corners) - 1
+    each = max(-(-(count - 1) // pieces), FEWEST)
+    time = np.interp(np.arange(pieces * each + 1) / each, np.arange(pieces + 1), corners)
+    travel = np.interp(time, corners, places)
+    return np.round(time, DECIMALS), np.round(travel, DECIMALS)
+
+
+def typical_speed(measurements: Sequence[Measurement]) -> float:
+    """Speed of the crosshead [mm/s] where it moves, the median of runs that are fitted."""
+    found = []
+    for run in (run for m in measurements for run in m.runs if not run.holdout):
+        change = np.diff(run.columns["displacement_mm"]) / np.diff(run.columns["time_s"])
+        speeds = np.abs(change)
+        found.append(float(np.median(speeds[speeds > 0.1 * speeds.max()])))
+    return rounded(float(np.median(found)))

@@ -21,7 +21,17 @@ from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, si
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-__all__ = ["TabulatedDashpot", "TabulatedSpring", "check_table", "cubics_of", "evaluated"]
+__all__ = [
+    "TabulatedDashpot",
+    "TabulatedSpring",
+    "check_table",
+    "cubics_of",
+    "evaluated",
+    "numbers_of",
+]
+
+Numbers = tuple[tuple[float, ...], tuple[float, ...]]
+"""Where the pieces of a table begin, and the coefficients of each."""
 
 MOMENTS = "moments per area there, not falling"
 
@@ -45,13 +55,16 @@ class TabulatedSpring(CrossingLaw):
 
     def moment(self, at: Crossing) -> Any:
         """The cubic of the interval that |γ| lies in, with the sign of γ."""
-        cubics = cubics_of(self.angles, self.moments)
-        return signed(at.gamma, evaluated(cubics, at.size, at.number))
+        return signed(at.gamma, evaluated(self.numbers_of_cubics(), at.size, at.number))
+
+    def numbers_of_cubics(self) -> Numbers:
+        """Where the pieces begin, and their coefficients, of each those of high powers first."""
+        return numbers_of(cubics_of(self.angles, self.moments))
 
     def energy(self, gamma: Any, memory: Mapping[str, Any], number: Callable[[Any], Any]) -> Any:
         """∫ M dγ from 0 to |γ|."""
         quartics = cubics_of(self.angles, self.moments).antiderivative()
-        return evaluated(quartics, size_of(gamma), number)
+        return evaluated(numbers_of(quartics), size_of(gamma), number)
 
 
 @dataclass(frozen=True)
@@ -76,7 +89,7 @@ class TabulatedDashpot(CrossingLaw):
     def moment(self, at: Crossing) -> Any:
         """The cubic of the interval that |γ̇| lies in, with the sign of γ̇."""
         cubics = cubics_of(self.rates, self.moments)
-        return signed(at.rate, evaluated(cubics, size_of(at.rate), at.number))
+        return signed(at.rate, evaluated(numbers_of(cubics), size_of(at.rate), at.number))
 
 
 def check_table(
@@ -106,11 +119,16 @@ def cubics_of(x: tuple[float, ...], y: tuple[float, ...]) -> PPoly:
     return PPoly(np.column_stack([cubics.c, ending]), [*x, x[-1] + 1.0])
 
 
-def evaluated(pieces: PPoly, size: Any, number: Callable[[Any], Any]) -> Any:
+def numbers_of(pieces: PPoly) -> Numbers:
+    """Where the pieces begin and their coefficients."""
+    return tuple(pieces.x[:-1].tolist()), tuple(pieces.c.T.ravel().tolist())
+
+
+def evaluated(numbers: Numbers, size: Any, number: Callable[[Any], Any]) -> Any:
     """Piecewise polynomials at a size that is not negative; the last piece goes on for ever."""
-    order, count = pieces.c.shape
-    knots = number(tuple(pieces.x[:-1]))
-    coefficients = number(tuple(pieces.c.T.ravel()))
+    count = len(numbers[0])
+    order = len(numbers[1]) // count
+    knots, coefficients = (number(part) for part in numbers)
     value: Any = None
     for i in reversed(range(count)):
         s = size - knots[i]

@@ -59,5 +59,8 @@ BIAS_EXTENSION = Kind(
     besides={"shear_angle_deg": "shear angle of the middle [°]"},
     mistakes=_mistakes,
     experiment=called_later(f"{__name__}.model", "BiasExtension"),
+    made_up=called_later(f"{__name__}.made_up", "made_up"),
+    options=("rates", "lengths", "angle_noise"),
+    proposals=called_later(f"{__name__}.proposals", "proposals"),
     needs_others=True,
 )

@@ -11,6 +11,7 @@ of k1 γ + k3 γ³ all but the first term.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +31,7 @@ __all__ = [
     "LIKE_THE_FRAME",
     "crossing_laws",
     "foretold",
+    "foretold_in_words",
     "locking",
     "locking_variant",
 ]
@@ -119,3 +121,19 @@ def foretold(expected: Array, observed: Array, D: Array, furthest: Array) -> dic
             if rows.any()
         },
     }
+
+
+def foretold_in_words(found: Mapping[str, float]) -> list[str]:
+    """A line of a report on what ``foretold`` says; none where there is nothing."""
+    if not found:
+        return []
+    told = [f"{found['error']:.2g} N rms"]
+    told += [
+        f"{found[part]:.2g} of the force in the {words} third of the travel"
+        for part, words in (("early", "first"), ("late", "last"))
+        if part in found
+    ]
+    return [
+        "The law that the picture frame found, whole and with nothing fitted, foretells "
+        f"these strips, pinned, to {', '.join(told)}."
+    ]

@@ -14,9 +14,9 @@ that go alike are taken together.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,83 +24,37 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ....errors import SolveError
-from ....fabric.bias_strip import BiasStrip
 from ....rigs.fabric_file import FabricFile
 from ...expressions.marching import Varying
 from ...inference.effects import Effect, Variant
 from ...inference.experiment import Readings
 from ...measurement.schema import Measurement, Run
-from ..crosshead import CrossheadTest, shifted
+from ..crosshead import CrossheadTest
 from ..drape.shear_field import hermite_weights
+from ..picture_frame.model import SAME_RATE
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
+from ..records import shifted
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
-from .frame_law import crossing_laws, foretold, locking_variant
-from .quantities import read_together
-from .strip import FINE_STEPS, KNOTS, STEPS, Curve, StripPath, solved_strip, strip_case
+from .frame_law import crossing_laws, foretold, foretold_in_words, locking_variant
+from .quantities import first_curve, read_together, strip_of
+from .solved import GROUPS, Part, Solved, SolvedStrips, Wanted, gamma_of, number, of_ways, reached
+from .strip import FINE_STEPS, KNOTS, Curve, strip_case
+from .terms import strip_terms
 
 __all__ = ["BiasExtension"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-#: Groups of crossings that go alike.
-GROUPS = 24
 #: Speeds of the crosshead that are told apart differ by this factor: tows are hardly viscous.
 PACE = 1.5
 #: Points of the way on which a law with memory is followed to its curve.
 ALONG = 60
-#: Share of the work by which a curve may differ from the one that a strip was solved with.
-NEAR = 0.35
-#: How often a strip is solved anew, at most, for each kind of motion.
-MOST = 4
 #: Share by which a curve, a slip or a crimp may differ from those that a fit was solved with.
 SETTLED = 0.02
 #: Least work of moments, over that of the first curve, that strips slip at.
 LEAST_SIZE = 1e-6
-#: k1 and k3 [N/mm] of the curve that strips are first solved with where readings tell nothing ...
-FIRST = (0.002, 0.02)
-#: ... fewer than this many of them.
-FEWEST = 4
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Way:
-    """One run's strip as it was solved, of the travel.
-
-    Attributes:
-        area: of the groups of crossings [mm²], (GROUPS,).
-        gamma: their angles [rad], (n, GROUPS) at n travels.
-        rest: force that is not the work of the crossings' curve [N].
-        middle: mean shear angle of the middle zone [rad].
-    """
-
-    area: Array
-    gamma: PchipInterpolator
-    rest: PchipInterpolator
-    middle: PchipInterpolator
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Solved:
-    """The strips of all runs, solved with one curve."""
-
-    curve: Curve
-    ways: tuple[_Way, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Part:
-    """Solved strips among those of a model: their weight, and how much larger its forces are.
-
-    Attributes:
-        solved: the strips.
-        weight, size: numbers with their derivatives by parameter.
-    """
-
-    solved: _Solved
-    weight: Varying
-    size: Varying = field(default_factory=lambda: _number(1.0))
 
 
 #: Of each run, what force [N] and angle [rad] were off by, of the travel.
@@ -114,7 +68,6 @@ class BiasExtension(CrossheadTest):
     listed = BIAS_EXTENSION_EFFECTS
     one_curve = None
     curves_only = False
-    terms: tuple[Effect, ...] = ()
 
     def __init__(
         self,
@@ -122,17 +75,41 @@ class BiasExtension(CrossheadTest):
         own: Sequence[Effect] = (),
         like: BiasExtension | None = None,
     ) -> None:
-        self._solved: dict[str, list[_Solved]] = {}
-        self._failed: dict[str, str] = {}
         self._corrections: dict[frozenset[Variant], _Correction] = {}
-        self._settled: dict[frozenset[Variant], tuple[_Solved, dict[str, Any]]] = {}
+        self._settled: dict[frozenset[Variant], tuple[Solved, dict[str, Any]]] = {}
+        self._like = like
         #: What a law that nothing was fitted of foretells; see frame_law.foretold.
         self.foretold: dict[str, float] = {}
-        self._surprises: list[float] = []
-        self._count = 0
+        #: Force of the strips as it was last foretold [N], also where angles are read.
+        self._pull = number(0.0)
         self._together = read_together(measurements)
         self._angles, self._parent = self._together.angles, self._together.parent
         super().__init__(self._together.measurements, own, like)
+
+    @cached_property
+    def terms(self) -> list[Effect]:
+        """Terms without a formula over what the fitted readings reached; none without forces."""
+        forces = self.readings.fit & self.readings.first
+        return strip_terms(self._ranges()) if forces.any() else []
+
+    @cached_property
+    def alike(self) -> frozenset[str]:  # type: ignore[override]
+        """Laws of the crossings, where all readings are of one way out at one speed.
+
+        Each of them is then a curve of the angle, whatever else it depends on.
+        """
+        speed = self._at_readings(self._points["D_rate"].value)[self.readings.fit]
+        if np.ptp(speed) > SAME_RATE * float(np.abs(speed).max()):
+            return frozenset()
+        every = (*self.effects, *self.terms)
+        return frozenset(
+            e.name for e in every if all(getattr(v, "laws", None) is not None for v in e.variants)
+        )
+
+    @property
+    def curve(self) -> Curve:
+        """The curve of the crossings that the strips of the last model were solved with."""
+        return self._mixture[0].solved.curve
 
     def take(self, fabric: FabricFile) -> None:
         """Take what a picture frame found, as a further form of locking, and say what it foretells.
@@ -153,16 +130,13 @@ class BiasExtension(CrossheadTest):
         try:
             self.foretold = self._foretold(Curve.through(moments))
         except SolveError as error:
-            self._failed["with the picture frame's law"] = str(error)
+            self._strips.failed["with the picture frame's law"] = str(error)
 
     def _foretold(self, curve: Curve) -> dict[str, float]:
         """How forces with a curve that nothing was fitted of meet what was read."""
-        solved = self._solve({}, curve)
+        solved = self._strips.solved({}, curve)
         D = self._points["D"].value
-        force = np.stack(
-            [self._force_of(way, D[:, r], curve) for r, way in enumerate(solved.ways)],
-            axis=1,
-        )
+        force = np.stack([way.force(D[:, r], curve) for r, way in enumerate(solved.ways)], axis=1)
         rows = self.readings.usable & self.readings.first
         expected, travel = (self._at_readings(values)[rows] for values in (force, D))
         furthest = self._furthest[self.readings.run[rows]]
@@ -185,18 +159,22 @@ class BiasExtension(CrossheadTest):
         same = [[other == own for other in kinds] for own in kinds]
         self._furthest = np.array([D.max(axis=0)[own].max() for own in same])
         self._speed = PACE**paces
-        self._groups: list[npt.NDArray[np.int64]] | None = None
         for (m, run), travel, pace in zip(runs, self._furthest, self._speed, strict=True):
             strip_case(m, run, float(travel), float(pace), {})
         # Of the curve that laws with memory and dashpots follow, the same throughout.
         angles = [
-            _strip(m, run).angle(0.5 * D) for (m, run), D in zip(runs, self._furthest, strict=True)
+            strip_of(m, run).angle(0.5 * D)
+            for (m, run), D in zip(runs, self._furthest, strict=True)
         ]
         rates = 2.0 * np.array(angles) / self._furthest * speed[self._parent]
         self._typical_rate = float(np.nanmedian(rates))
-        first = self._solve({}, self._first_curve())
-        self._mixture = [_Part(first, _number(1.0))]
-        self._reached = _reached(first, self._furthest)
+        like = self._like
+        paths = {} if like is None else like._strips.paths
+        self._strips: SolvedStrips = SolvedStrips(runs, self._furthest, self._speed, paths)
+        suggested = first_curve(self._of_forces()) if like is None else like.curve
+        first = self._strips.solved({}, suggested)
+        self._mixture = [Part(first, number(1.0))]
+        self._reached = reached(first, self._furthest)
         self._reached /= float(self._reached @ first.curve.moments)
 
     def _named(self, readings: Readings) -> Readings:
@@ -216,35 +194,6 @@ class BiasExtension(CrossheadTest):
             for (m, run), angle in every
             if not angle and np.isfinite(run.columns["force_N"]).any()
         ]
-
-    def _first_curve(self) -> Curve:
-        """As the energy of zones of constant shear has it; where that is not known, a cubic."""
-        gamma, found = np.radians(KNOTS), []
-        for m, run in self._of_forces():
-            D, force = run.columns["displacement_mm"], run.columns["force_N"]
-            strip = _strip(m, run)
-            if run.holdout or strip.bias != 45.0 or strip.length < 2.0 * strip.width:
-                continue
-            angle = strip.angle(D)
-            before = np.fmax.accumulate(np.concatenate([[1e-3], angle[:-1]]))
-            rising = (angle > before) & (np.arange(len(D)) <= np.argmax(D))
-            if rising.sum() >= FEWEST:
-                moment = strip.moment(angle[rising], force[rising])
-                last = np.polyfit(angle[rising][-FEWEST:], moment[-FEWEST:], 1)
-                beyond = np.maximum(gamma - angle[rising][-1], 0.0) * max(last[0], 0.0)
-                found.append(np.interp(gamma, angle[rising], moment) + beyond)
-        typical = np.median(found, axis=0) if found else np.zeros_like(gamma)
-        if max(typical) <= 0.0:
-            typical = FIRST[0] * gamma + FIRST[1] * gamma**3
-        return Curve.through(typical)
-
-    def _work(self, way: _Way, D: Array, curve: Curve) -> Array:
-        """Σ A dγ/dD m(γ) of the groups at some travels, (n, GROUPS)."""
-        return np.asarray(way.area * way.gamma(D, 1) * curve(way.gamma(D)))
-
-    def _force_of(self, way: _Way, D: Array, curve: Curve) -> Array:
-        """Force [N] of a strip that goes as it was solved, with a curve, at some travels, (n,)."""
-        return np.asarray(way.rest(D) + self._work(way, D, curve).sum(axis=1))
 
     def _more_shares(self) -> dict[str, float]:
         """One over the largest force that comes on a tow of the clamps [1/N]."""
@@ -271,93 +220,6 @@ class BiasExtension(CrossheadTest):
 
     # Strips -------------------------------------------------------------------------------
 
-    def _solve(self, changes: Mapping[str, Any], curve: Curve, steps: int = STEPS) -> _Solved:
-        """Strips with some keys of their case and a curve; with few steps, kept for others near by.
-
-        Raises:
-            SolveError: one of them stopped before its end.
-        """
-        paths = []
-        known: dict[str, StripPath] = {}
-        for (m, run), travel, pace in zip(self._runs, self._furthest, self._speed, strict=True):
-            case = strip_case(m, run, float(travel), float(pace), changes, steps)
-            key = case.model_dump_json()
-            if key not in known:
-                known[key] = solved_strip(case, curve)
-            paths.append(known[key])
-        if self._groups is None:
-            self._groups = [_alike(path) for path in paths]
-        ways = []
-        for path, group in zip(paths, self._groups, strict=True):
-            area = np.bincount(group, path.area, GROUPS).astype(np.float64)
-            gamma = np.stack(
-                [np.bincount(group, path.area * row, GROUPS) / area for row in path.gamma]
-            )
-            of_travel = PchipInterpolator(path.travel, gamma)
-            work = np.sum(area * of_travel(path.travel, 1) * curve(gamma), axis=1)
-            ways.append(
-                _Way(
-                    area,
-                    of_travel,
-                    PchipInterpolator(path.travel, path.force - work),
-                    PchipInterpolator(path.travel, path.middle),
-                )
-            )
-        found = _Solved(curve, tuple(ways))
-        self._count += 1
-        if steps == STEPS:
-            self._solved.setdefault(_key(changes), []).append(found)
-        return found
-
-    def _nearest(self, changes: Mapping[str, Any], curve: Curve) -> _Solved:
-        """The strips solved with a curve that is near, or now with this one.
-
-        Raises:
-            SolveError: there are none, and none with this curve.
-        """
-        key = _key(changes)
-        known = self._solved.get(key, [])
-        apart = [self._apart(curve, one) for one in known]
-        enough = len(known) >= MOST or key in self._failed
-        if known and (enough or curve.idle or min(apart) < NEAR):
-            return known[int(np.argmin(apart))]
-        if enough:
-            raise SolveError(self._failed[key])
-        try:
-            found = self._solve(changes, curve)
-        except SolveError as error:
-            self._failed[key] = str(error)
-            if not known:
-                raise
-            return known[int(np.argmin(apart))]
-        if known:
-            before = known[int(np.argmin(apart))]
-            self._surprises.append(self._surprise(found, before))
-        return found
-
-    def _apart(self, curve: Curve, solved: _Solved) -> float:
-        """By how much of its work a curve differs from the one that strips were solved with."""
-        differs = total = 0.0
-        for way, furthest in zip(solved.ways, self._furthest, strict=True):
-            D = np.linspace(0.0, furthest, 20)
-            mine, other = self._work(way, D, curve), self._work(way, D, solved.curve)
-            differs += float(np.abs(mine - other).sum())
-            total += float(np.abs(mine).sum())
-        return differs / max(total, 1e-300)
-
-    def _surprise(self, found: _Solved, before: _Solved) -> float:
-        """Root mean square by which strips differ from what others had foretold of their curve.
-
-        A share of the force.
-        """
-        off, size = [], []
-        for new, old, furthest in zip(found.ways, before.ways, self._furthest, strict=True):
-            D = np.linspace(0.0, furthest, 20)[1:]
-            force = self._force_of(new, D, found.curve)
-            off.append(force - self._force_of(old, D, found.curve))
-            size.append(force)
-        return float(np.linalg.norm(np.concatenate(off)) / np.linalg.norm(np.concatenate(size)))
-
     def settle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """Solve the strips of a model that a fit ended with, all that it has at once.
 
@@ -377,28 +239,30 @@ class BiasExtension(CrossheadTest):
             alike = changes.keys() == with_these.keys() and all(
                 abs(changes[n] - v) <= SETTLED * abs(v) for n, v in with_these.items()
             )
-            if alike and self._apart(curve, known) < SETTLED:
+            if alike and known.apart(curve) < SETTLED:
                 return
         place = (
             f"where a fit ended with {', '.join(sorted(v.label for v in key)) or 'the baseline'}"
         )
-        if place in self._failed:
+        if place in self._strips.failed:
             return
         try:
-            exact = self._solve(changes, curve, FINE_STEPS)
+            exact = self._strips.solved(changes, curve, FINE_STEPS)
         except SolveError as error:
-            self._failed[place] = str(error)
+            self._strips.failed[place] = str(error)
             return
         self._settled[key] = exact, changes
         self._mixture = self._mixed(variants, values)
         D = np.linspace(0.0, self._furthest, ALONG)
-        gamma, slope = (self._gamma_at(D, order).value for order in (0, 1))
+        gamma, slope = (gamma_of(self._mixture, D, order).value for order in (0, 1))
         area = np.concatenate([way.area for way in exact.ways])
         work = (area * slope * curve(gamma)).reshape(*D.shape, GROUPS).sum(axis=2)
-        force, middle = (self._of_ways(Varying(D), name).value for name in ("rest", "middle"))
+        force, middle = (
+            of_ways(self._mixture, Varying(D), name).value for name in ("rest", "middle")
+        )
         self._corrections[key] = tuple(
             (
-                PchipInterpolator(at, self._force_of(way, at, curve) - own_force),
+                PchipInterpolator(at, way.force(at, curve) - own_force),
                 PchipInterpolator(at, way.middle(at) - own_middle),
             )
             for way, at, own_force, own_middle in zip(
@@ -406,7 +270,7 @@ class BiasExtension(CrossheadTest):
             )
         )
 
-    def _mixed(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[_Part]:
+    def _mixed(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[Part]:
         """What is known of the strips of a model, solved now where that is not enough.
 
         Slip at a force F0 with moments m is that at F0/s with moments m/s, in forces s times as
@@ -414,25 +278,30 @@ class BiasExtension(CrossheadTest):
         """
         moments = self._moments(variants, values)
         curve = Curve.through(moments.value)
-        base, found = _number(1.0), list[_Part]()
+        base, parts = number(1.0), list[tuple[Wanted, Varying, Varying]]()
         for v in variants:
             if not isinstance(v, StripPullVariant) or v.changes is None:
                 continue
             name = v.parameters[0].name
-            amplitude, size, mine = _number(values[name], {name: 1.0}), _number(1.0), curve
+            amplitude, size, mine = number(values[name], {name: 1.0}), number(1.0), curve
             if v.per_force:
                 size = self._size(moments)
                 amplitude = amplitude * size
                 mine = Curve.through(moments.value / size.value)
             at = float(amplitude.value)
             for node, weight, slope in zip(*hermite_weights(v.solved_at, at), strict=True):
-                part = _number(weight, {p: slope * d for p, d in amplitude.slopes.items()})
+                part = number(weight, {p: slope * d for p, d in amplitude.slopes.items()})
                 if node == 0.0:
                     base += part
                 else:
-                    found.append(_Part(self._nearest(v.changes(node), mine), part, size))
-            base += _number(-1.0)
-        return [_Part(self._nearest({}, curve), base), *found]
+                    parts.append(((v.changes(node), mine), part, size))
+            base += number(-1.0)
+        parts.insert(0, (({}, curve), base, number(1.0)))
+        sets = self._strips.nearest([wanted for wanted, _, _ in parts])
+        return [
+            Part(solved, weight, size)
+            for solved, (_, weight, size) in zip(sets, parts, strict=True)
+        ]
 
     def _moments(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Varying:
         """The moments of a model's laws; see _at_knots."""
@@ -451,7 +320,7 @@ class BiasExtension(CrossheadTest):
             "rate": Varying(np.full_like(gamma, rate)),
             "per_time": Varying(np.full_like(gamma, rate / float(gamma[1, 0]))),
         }
-        total = _number(0.0)
+        total = number(0.0)
         for v in forms:
             total += self._moment(v, known, values)
 
@@ -463,11 +332,11 @@ class BiasExtension(CrossheadTest):
 
     def _size(self, moments: Varying) -> Varying:
         """Work of moments at KNOTS, over that of the first strips' curve on the same way."""
-        size = _number(
+        size = number(
             float(self._reached @ moments.value),
             {p: float(self._reached @ slope) for p, slope in moments.slopes.items()},
         )
-        return size if size.value > LEAST_SIZE else _number(LEAST_SIZE)
+        return size if size.value > LEAST_SIZE else number(LEAST_SIZE)
 
     # Model --------------------------------------------------------------------------------
 
@@ -479,19 +348,10 @@ class BiasExtension(CrossheadTest):
         points, runs = self._points["D"].value.shape
         return self._at_readings(values.reshape(points, runs, GROUPS)[:, :, -1])
 
-    def _gamma_at(self, D: Array, order: int) -> Varying:
-        """Angles of all groups, or derivatives in D (n_points, n_runs), (n_points, n_groups)."""
-        total = _number(0.0)
-        for part in self._mixture:
-            ways = part.solved.ways
-            own = np.hstack([way.gamma(D[:, r], order) for r, way in enumerate(ways)])
-            total += part.weight * Varying(own)
-        return total
-
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]
         area = np.concatenate([way.area for way in self._mixture[0].solved.ways])
-        gamma, first, second = (self._gamma_at(D.value, order) for order in range(3))
+        gamma, first, second = (gamma_of(self._mixture, D.value, order) for order in range(3))
 
         def each(values: Array) -> Array:
             """Of every run, at each of its groups."""
@@ -526,13 +386,13 @@ class BiasExtension(CrossheadTest):
     ) -> Varying:
         self._mixture = self._mixed(variants, values)
         whole = super()._force(travel, variants, values)
-        found = whole + self._of_ways(travel["D"], "rest") + self._correction(variants, travel, 0)
+        rest, middle = (of_ways(self._mixture, travel["D"], name) for name in ("rest", "middle"))
+        found = self._pull = whole + rest + self._correction(variants, travel, 0)
         if not self._angles.any():
             return found
         # Of runs of angles nothing else counts.
         degree = np.asarray(np.degrees(self._together.unit))
-        middle = self._of_ways(travel["D"], "middle") + self._correction(variants, travel, 1)
-        angles = middle * Varying(degree)
+        angles = (middle + self._correction(variants, travel, 1)) * Varying(degree)
         return Varying(
             np.where(self._angles, angles.value, found.value),
             {
@@ -541,101 +401,33 @@ class BiasExtension(CrossheadTest):
             },
         )
 
+    def _known(self, force: Varying) -> dict[str, Callable[[], Varying]]:
+        """The force of the strip also where its angle is read."""
+        return super()._known(self._pull)
+
     def _correction(self, variants: Sequence[Variant], travel: Any, which: int) -> Varying:
         """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
         off, D = self._corrections.get(_solved_by(variants)), travel["D"]
         if off is None:
-            return _number(0.0)
+            return number(0.0)
         at = np.clip(D.value, 0.0, self._furthest)
         value, change = (
             np.stack([own[which](at[:, r], k) for r, own in enumerate(off)], axis=1) for k in (0, 1)
         )
         return Varying(value, {p: change * slope for p, slope in D.slopes.items()})
 
-    def _of_ways(self, D: Varying, name: str) -> Varying:
-        """What the ways of a model's strips say, (n_points, n_runs): their rest, or the angle.
-
-        The first goes with the size of the forces.
-        """
-        total = _number(0.0)
-        for part in self._mixture:
-            value, change = (
-                np.stack(
-                    [getattr(w, name)(D.value[:, r], k) for r, w in enumerate(part.solved.ways)],
-                    axis=1,
-                )
-                for k in (0, 1)
-            )
-            own = Varying(value, {p: change * slope for p, slope in D.slopes.items()})
-            weight = part.weight * part.size if name == "rest" else part.weight
-            total += weight * own
-        return total
-
-    def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
-        """Nothing: there are no such terms of a strip; see Experiment."""
-        raise NotImplementedError(variant.label)
-
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
         """Mean shear angle of the middle zone at every reading [degrees], (n,)."""
         self._mixture = self._mixed(variants, values)
-        middle = self._of_ways(self._points["D"], "middle")
+        middle = of_ways(self._mixture, self._points["D"], "middle")
         middle += self._correction(variants, self._points, 1)
         return self._at_readings(np.degrees(middle.value))
 
     @property
     def notes(self) -> list[str]:  # type: ignore[override]
         """What a report must say of the model."""
-        found = [
-            f"The strips were solved {self._count} times, with curves m(γ) of their crossings; in "
-            "between forces follow to first order, with the angles as they were. Where fits end "
-            "they are solved as they are."
-        ]
-        if len(self._surprises) > 1:
-            off = 100.0 * float(np.median(self._surprises))
-            found.append(
-                f"That foretold the forces of the next strips to {off:.2g} % rms in the median."
-            )
-        if self.foretold:
-            told = [f"{self.foretold['error']:.2g} N rms"]
-            told += [
-                f"{self.foretold[part]:.2g} of the force in the {words} third of the travel"
-                for part, words in (("early", "first"), ("late", "last"))
-                if part in self.foretold
-            ]
-            found.append(
-                "The law that the picture frame found, whole and with nothing fitted, foretells "
-                f"these strips, pinned, to {', '.join(told)}."
-            )
-        if self._angles.any():
-            sigma, given = self._together.sigma
-            found.append(
-                f"Mean angles of the middle are fitted with the forces, as {sigma:.2g} degrees are "
-                f"{'given' if given else 'taken'} for their noise; they are the model's of all "
-                "crossings whose two tows end in no clamp."
-            )
-        found += [f"{key or 'pinned'}: {why}; left out." for key, why in self._failed.items()]
-        return found
-
-
-def _strip(measurement: Measurement, run: Run) -> BiasStrip:
-    return BiasStrip(run.own["length_mm"], run.own["width_mm"], measurement.rig.bias_deg)
-
-
-def _reached(solved: _Solved, furthest: Array) -> Array:
-    """Weights of moments at KNOTS that make the work of all strips on their way, (n_knots,).
-
-    Of crossings that got to γ_c, Σ A ∫ m dγ from 0 to γ_c, with m straight between knots.
-    """
-    gamma = np.linspace(0.0, np.radians(KNOTS[-1]), 8 * ALONG)
-    area = np.zeros_like(gamma)
-    for way, D in zip(solved.ways, furthest, strict=True):
-        area += np.sum(way.area * (way.gamma(D) > gamma[:, None]), axis=1)
-    shapes = np.stack([np.interp(gamma, np.radians(KNOTS), unit) for unit in np.eye(len(KNOTS))])
-    return np.asarray(shapes @ area * (gamma[1] - gamma[0]))
-
-
-def _number(value: float, slopes: Mapping[str, Any] = MappingProxyType({})) -> Varying:
-    return Varying(np.asarray(value), {p: np.asarray(slope) for p, slope in slopes.items()})
+        strips, angles = self._strips, self._together.notes
+        return [*strips.notes, *foretold_in_words(self.foretold), *angles, *strips.left_out]
 
 
 def _solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:
@@ -646,16 +438,3 @@ def _solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:
         if isinstance(v, FrameVariant)
         and (v.laws is not None or getattr(v, "changes", None) is not None)
     )
-
-
-def _key(changes: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name} = {value:g}" for name, value in changes.items())
-
-
-def _alike(path: StripPath) -> npt.NDArray[np.int64]:
-    """Group of each crossing, by its angle at the end; all groups have about the same area."""
-    order = np.argsort(path.gamma[-1], kind="stable")
-    share = np.cumsum(path.area[order]) / path.area.sum()
-    group = np.empty(len(order), dtype=np.int64)
-    group[order] = np.minimum((share * GROUPS * (1.0 - 1e-12)).astype(int), GROUPS - 1)
-    return group

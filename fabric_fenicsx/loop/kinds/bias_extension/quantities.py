@@ -13,13 +13,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ....errors import InputError
+from ....fabric.bias_strip import BiasStrip
 from ...inference.experiment import Another, Readings
 from ...inference.noise import roughness
 from ...measurement.readings import common_noise
 from ...measurement.schema import Measurement, Run
+from .strip import KNOTS, Curve
 
-__all__ = ["ANGLE", "ReadTogether", "read_together"]
+__all__ = ["ANGLE", "ReadTogether", "first_curve", "force_noise", "read_together", "strip_of"]
 
+Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 ANGLE = "shear_angle_deg"
@@ -28,6 +31,8 @@ FEWEST = 4
 #: Least sigma [degrees] of an angle, and least share of the largest force of a force, where it is
 #: not given: what authors have smoothed is not known that well.
 LEAST_ANGLE, LEAST_FORCE = 0.5, 1e-3
+#: k1 and k3 [N/mm] of the curve that strips are first solved with where readings tell nothing.
+FIRST = (0.002, 0.02)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +55,18 @@ class ReadTogether:
     def angles(self) -> Flags:
         """Runs of angles, (n_runs,)."""
         return np.arange(len(self.parent)) > self.parent
+
+    @property
+    def notes(self) -> list[str]:
+        """What a report must say of angles, if there are any."""
+        if not self.angles.any():
+            return []
+        sigma, given = self.sigma
+        return [
+            f"Mean angles of the middle are fitted with the forces, as {sigma:.2g} degrees are "
+            f"{'given' if given else 'taken'} for their noise; they are the model's of all "
+            "crossings whose two tows end in no clamp."
+        ]
 
     def named(self, readings: Readings) -> Readings:
         """The readings of all runs, with what they are and which specimen they are of."""
@@ -85,11 +102,7 @@ def read_together(measurements: Sequence[Measurement]) -> ReadTogether:
     sigma = float(np.sqrt(np.mean(np.square(stated)))) if stated else _rough(every, ANGLE)
     if not stated:
         sigma = max(np.nan_to_num(sigma), LEAST_ANGLE)
-    noise = common_noise(measurements)
-    if noise is None:
-        largest = max(float(np.nanmax(np.abs(r.columns["force_N"]), initial=0.0)) for _, r in every)
-        noise = max(float(np.nan_to_num(_rough(every, "force_N"))), LEAST_FORCE * largest) or 1.0
-    unit = noise / sigma
+    unit = force_noise(measurements) / sigma
     read = [[run for run in m.runs if _count(run, ANGLE) >= FEWEST] for m in measurements]
     angles = [
         replace(m, runs=tuple(_angles(run, unit) for run in runs))
@@ -102,6 +115,16 @@ def read_together(measurements: Sequence[Measurement]) -> ReadTogether:
         unit,
         (sigma, bool(stated)),
     )
+
+
+def force_noise(measurements: Sequence[Measurement]) -> float:
+    """One sigma of a force [N], as it is given or as neighbouring readings differ."""
+    noise = common_noise(measurements)
+    if noise is not None:
+        return noise
+    every = [(m, run) for m in measurements for run in m.runs]
+    largest = max(float(np.nanmax(np.abs(r.columns["force_N"]), initial=0.0)) for _, r in every)
+    return max(float(np.nan_to_num(_rough(every, "force_N"))), LEAST_FORCE * largest) or 1.0
 
 
 def _count(run: Run, column: str) -> int:
@@ -139,3 +162,36 @@ def _angles(run: Run, unit: float) -> Run:
     columns = {name: run.columns[name][read] for name in ("time_s", "displacement_mm")}
     columns["force_N"] = unit * run.columns[ANGLE][read]
     return replace(run, columns=columns, label=f"{run.label or run.file}, angle")
+
+
+def strip_of(measurement: Measurement, run: Run) -> BiasStrip:
+    """The strip of a run."""
+    return BiasStrip(run.own["length_mm"], run.own["width_mm"], measurement.rig.bias_deg)
+
+
+def first_curve(runs: Sequence[tuple[Measurement, Run]]) -> Curve:
+    """A curve of the crossings to begin with.
+
+    As the energy of zones of constant shear has it; where that is not known, a cubic.
+
+    Args:
+        runs: of forces, with their measurements.
+    """
+    gamma, found = np.radians(KNOTS), []
+    for m, run in runs:
+        D, force = run.columns["displacement_mm"], run.columns["force_N"]
+        strip = strip_of(m, run)
+        if run.holdout or strip.bias != 45.0 or strip.length < 2.0 * strip.width:
+            continue
+        angle = strip.angle(D)
+        before = np.fmax.accumulate(np.concatenate([[1e-3], angle[:-1]]))
+        rising = (angle > before) & (np.arange(len(D)) <= np.argmax(D))
+        if rising.sum() >= FEWEST:
+            moment = strip.moment(angle[rising], force[rising])
+            last = np.polyfit(angle[rising][-FEWEST:], moment[-FEWEST:], 1)
+            beyond = np.maximum(gamma - angle[rising][-1], 0.0) * max(last[0], 0.0)
+            found.append(np.interp(gamma, angle[rising], moment) + beyond)
+    typical = np.median(found, axis=0) if found else np.zeros_like(gamma)
+    if max(typical) <= 0.0:
+        typical = FIRST[0] * gamma + FIRST[1] * gamma**3
+    return Curve.through(typical)

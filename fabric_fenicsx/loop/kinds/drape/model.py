@@ -91,6 +91,7 @@ class Drape:
     baseline: tuple[Parameter, ...] = ()
     one_curve = None
     curves_only = False
+    alike: frozenset[str] = frozenset()
     terms = ()
 
     def __init__(

@@ -22,14 +22,14 @@ from ufl import acos, sin
 
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, Variant
+from ...inference.effects import Effect
 from ...inference.experiment import OneCurve
 from ...measurement.schema import Measurement, Run
-from ..crosshead import CrossheadTest, of_a_crossing, shifted
+from ..crosshead import CrossheadTest
+from ..records import shifted
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
 from .terms import terms
-from .variant import FrameVariant
 
 __all__ = ["PictureFrame"]
 
@@ -73,29 +73,7 @@ class PictureFrame(CrossheadTest):
     @cached_property
     def terms(self) -> list[Effect]:
         """Terms without a formula over what the fitted readings reached, if more than curves."""
-        rows = self.readings.fit
-        if self.curves_only:
-            return []
-
-        def most(values: Any) -> float:
-            return float(np.abs(self._at_readings(values)[rows]).max())
-
-        D, speed, time = (self._points[name] for name in ("D", "D_rate", "time"))
-        change = np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0)
-        path = np.concatenate([np.zeros_like(D.value[:1]), np.cumsum(np.abs(change), axis=0)])
-        force = self.readings.observed[rows]
-        ranges = {
-            "angle": float(np.abs(self._gamma[rows]).max()),
-            "rate": float(np.abs(self._rate[rows]).max()),
-            "path": most(path),
-            "time": most(time.value - time.value[0]),
-            "displacement": most(D.value),
-            "speed": most(speed.value),
-            "acceleration": most(self._per_second(speed).value),
-            "force": float(np.abs(force).max()),
-            "force_rate": float(np.abs(force).max() / max(np.median(time.value[-1]), 1e-9)),
-        }
-        return terms(ranges)
+        return [] if self.curves_only else terms(self._ranges())
 
     @property
     def one_curve(self) -> OneCurve | None:
@@ -116,24 +94,6 @@ class PictureFrame(CrossheadTest):
         return len(rate) > 0 and any(
             np.ptp(v) <= SAME_RATE * float(np.abs(v).max(initial=0.0)) for v in (speed, rate)
         )
-
-    def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
-        """What a term without a formula depends on, at every reading; see Experiment."""
-        assert isinstance(variant, FrameVariant)
-        if variant.laws is None:
-            known = self._force(self._points, (), values)
-            return self._at_readings(self._known(known)[variant.of[0]]().value)
-        key = (variant, "along")
-        if key not in self._compiled:
-            names = tuple(p.name for p in variant.parameters) + variant.of_baseline
-            marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
-            law = variant.laws(marched.at)[0]
-            crossing = of_a_crossing(marched, 0)
-            history = {f"0 {n}": value for n, value in law.history(crossing).items()}
-            variable = law.variable_at(crossing)
-            self._compiled[key] = marched.define({"variable": variable}, history)
-        found = self._compiled[key](self._kinematics(self._points, {}), values)["variable"]
-        return self._at_readings(found.value)
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         """γ at each point and at the one before, γ̇, and force per moment."""

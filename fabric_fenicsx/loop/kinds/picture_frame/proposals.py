@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from ...measurement.proposal import Proposal, proposed, rounded, typical_count
+from ...measurement.proposal import (
+    DECIMALS,
+    Leg,
+    Proposal,
+    proposed,
+    rounded,
+    travelled,
+    typical_count,
+    typical_speed,
+)
 from ...measurement.schema import Measurement
 
 __all__ = ["proposals"]
@@ -23,19 +31,6 @@ FURTHER = 1.3
 HOLD = 3.0
 #: A rest of the unloaded frame is this share of the loading.
 REST = 0.25
-#: Fewest intervals between readings on a leg: its rate is to be found from them.
-FEWEST = 10
-#: Decimals of times [s] and travels [mm]: as they are written.
-DECIMALS = 6
-
-
-@dataclass(frozen=True, slots=True)
-class _Leg:
-    """A way at one speed to an angle [degrees], and a hold there [s]; from there, no way."""
-
-    angle: float
-    speed: float
-    hold: float = 0.0
 
 
 def proposals(measurements: Sequence[Measurement]) -> list[Proposal]:
@@ -47,32 +42,37 @@ def proposals(measurements: Sequence[Measurement]) -> list[Proposal]:
         float(np.abs(_angle(run.columns["displacement_mm"], frame)).max())
         for (_, run), frame in zip(runs, frames, strict=True)
     )
-    speed = rounded(float(np.median([_speed(run.columns) for _, run in runs])))
+    speed = typical_speed(measurements)
     frame, count = like.rig.frame_length_mm, typical_count(measurements)
+
+    def leg(angle: float, speed: float, hold: float = 0.0) -> Leg:
+        """To an angle [degrees]."""
+        return Leg(_travel(angle, frame), speed, hold)
+
     full, beyond = _below(min(largest, CLOSEST)), _below(min(FURTHER * largest, CLOSEST))
     loading = _travel(full, frame) / speed
     hold, rest = rounded(HOLD * loading), rounded(REST * loading)
     third, two = _below(full / 3.0), _below(2.0 * full / 3.0)
-    cycles = [_Leg(a, speed) for turn in (third, two, full) for a in (turn, 0.0)]
+    cycles = [leg(a, speed) for turn in (third, two, full) for a in (turn, 0.0)]
     to_and_fro = "load to {}° at {:g} mm/s, unload"
     programmes = [
-        (to_and_fro.format(f"{full:g}", v), [_Leg(full, v), _Leg(0.0, v)])
+        (to_and_fro.format(f"{full:g}", v), [leg(full, v), leg(0.0, v)])
         for v in (speed, 10.0 * speed, speed / 10.0)
     ]
     programmes += [
         (
             f"load to {full:g}° at {speed:g} mm/s, hold {hold:g} s, unload",
-            [_Leg(full, speed, hold), _Leg(0.0, speed)],
+            [leg(full, speed, hold), leg(0.0, speed)],
         ),
         (
             f"hold the unloaded frame {rest:g} s, load to {full:g}° at {speed:g} mm/s, unload, "
             f"hold {rest:g} s",
-            [_Leg(0.0, speed, rest), _Leg(full, speed), _Leg(0.0, speed, rest)],
+            [leg(0.0, speed, rest), leg(full, speed), leg(0.0, speed, rest)],
         ),
         (
             f"load to {full:g}° at {speed:g} mm/s, then to {-full:g}°, the other side, and back "
             "to 0°",
-            [_Leg(full, speed), _Leg(-full, speed), _Leg(0.0, speed)],
+            [leg(full, speed), leg(-full, speed), leg(0.0, speed)],
         ),
         (
             f"cycles of growing angle, {third:g}°, {two:g}° and {full:g}°, at {speed:g} mm/s, "
@@ -85,10 +85,10 @@ def proposals(measurements: Sequence[Measurement]) -> list[Proposal]:
             (
                 to_and_fro.format(f"{beyond:g}", speed)
                 + f" ({beyond / largest:.2g} times the largest angle so far)",
-                [_Leg(beyond, speed), _Leg(0.0, speed)],
+                [leg(beyond, speed), leg(0.0, speed)],
             )
         )
-    found = [_proposal(label, like, *_path(legs, frame, count)) for label, legs in programmes]
+    found = [_proposal(label, like, *travelled(legs, count)) for label, legs in programmes]
     first = runs[0][1]
     same = (first.columns["time_s"], first.columns["displacement_mm"])
     name = first.label or first.file
@@ -100,23 +100,6 @@ def _proposal(label: str, like: Measurement, time: Array, travel: Array) -> Prop
     return proposed(label, like, columns, {"force_N": np.zeros(len(time))})
 
 
-def _path(legs: Sequence[_Leg], frame: float, count: int) -> tuple[Array, Array]:
-    """Times [s] and travels [mm] of readings, as many on each leg and hold, at its ends too."""
-    corners, places = [0.0], [0.0]
-    for leg in legs:
-        goal = _travel(leg.angle, frame)
-        way = abs(goal - places[-1])
-        for seconds in (way / leg.speed, leg.hold):
-            if seconds > 0.0:
-                corners.append(corners[-1] + seconds)
-                places.append(goal)
-    pieces = len(corners) - 1
-    each = max(-(-(count - 1) // pieces), FEWEST)
-    time = np.interp(np.arange(pieces * each + 1) / each, np.arange(pieces + 1), corners)
-    travel = np.interp(time, corners, places)
-    return np.round(time, DECIMALS), np.round(travel, DECIMALS)
-
-
 def _angle(travel: Array, frame: float) -> Array:
     """Shear angle [degrees] at a travel [mm]."""
     return np.asarray(90.0 - 2.0 * np.degrees(np.arccos((np.sqrt(2.0) + travel / frame) / 2.0)))
@@ -126,12 +109,6 @@ def _travel(angle: float, frame: float) -> float:
     """Travel [mm] at a shear angle [degrees]."""
     travel = frame * (2.0 * np.cos(np.radians(45.0 - angle / 2.0)) - np.sqrt(2.0))
     return round(float(travel), DECIMALS)
-
-
-def _speed(columns: dict[str, Array]) -> float:
-    """Speed of the crosshead [mm/s] where it moves."""
-    speeds = np.abs(np.diff(columns["displacement_mm"]) / np.diff(columns["time_s"]))
-    return float(np.median(speeds[speeds > 0.1 * speeds.max()]))
 
 
 def _below(angle: float) -> float:

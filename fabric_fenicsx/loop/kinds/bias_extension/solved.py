@@ -1,0 +1,354 @@
+"""The strips of all runs as they were solved, with one curve of their crossings after another.
+
+A set of strips goes with one curve m(γ) and, where tows slip or are crimped, with some changed keys
+of the case; forces with other curves follow to first order (see model). Whoever asks for a curve
+has the nearest that was solved with these keys, or that one where none is near. All that has to be
+solved for one model is solved at once, in several processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
+
+from ....errors import SolveError
+from ...expressions.marching import Varying
+from ...measurement.schema import Measurement, Run
+from ...workers import each_of
+from .strip import KNOTS, STEPS, Curve, StripPath, solved_strip, strip_case
+
+__all__ = [
+    "GROUPS",
+    "Part",
+    "Solved",
+    "SolvedStrips",
+    "Wanted",
+    "Way",
+    "gamma_of",
+    "number",
+    "of_ways",
+    "reached",
+]
+
+Array = npt.NDArray[np.float64]
+
+#: Groups of crossings that go alike.
+GROUPS = 24
+#: Share of the work by which a curve may differ from the one that a strip was solved with.
+NEAR = 0.35
+#: How often a strip is solved anew, at most, for each kind of motion.
+MOST = 4
+#: Travels at which forces of strips are compared, and angles at which their work is summed.
+TRAVELS, ANGLES = 20, 480
+
+Wanted = tuple[Mapping[str, Any], Curve]
+"""Changed keys of the case, by their dotted names, and a curve."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """One run's strip as it was solved, of the travel.
+
+    Attributes:
+        area: of the groups of crossings [mm²], (GROUPS,).
+        gamma: their angles [rad], (n, GROUPS) at n travels.
+        rest: force that is not the work of the crossings' curve [N].
+        middle: mean shear angle of the middle zone [rad].
+    """
+
+    area: Array
+    gamma: PchipInterpolator
+    rest: PchipInterpolator
+    middle: PchipInterpolator
+
+    def work(self, D: Array, curve: Curve) -> Array:
+        """A dγ/dD m(γ) of the groups at some travels [mm], (n, GROUPS)."""
+        return np.asarray(self.area * self.gamma(D, 1) * curve(self.gamma(D)))
+
+    def force(self, D: Array, curve: Curve) -> Array:
+        """Force [N] of a strip that goes as it was solved, with a curve, at some travels, (n,)."""
+        return np.asarray(self.rest(D) + self.work(D, curve).sum(axis=1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solved:
+    """The strips of all runs, solved with one curve.
+
+    Attributes:
+        curve: of their crossings.
+        ways: of each run.
+        passed: angles of all groups at some travels of all runs [rad], (n,).
+        weight: A dγ/dD there, (n,).
+        work: that times the curve's moments, (n,).
+    """
+
+    curve: Curve
+    ways: tuple[Way, ...]
+    passed: Array
+    weight: Array
+    work: Array
+
+    @classmethod
+    def along(cls, curve: Curve, ways: Sequence[Way], furthest: Array) -> Solved:
+        """The same, from the travels that the strips went to [mm], (n_runs,)."""
+        every = [(way, np.linspace(0.0, D, TRAVELS)) for way, D in zip(ways, furthest, strict=True)]
+        passed = np.concatenate([way.gamma(D).ravel() for way, D in every])
+        weight = np.concatenate([(way.area * way.gamma(D, 1)).ravel() for way, D in every])
+        return cls(curve, tuple(ways), passed, weight, weight * curve(passed))
+
+    def apart(self, curve: Curve) -> float:
+        """By how much of its work a curve differs from the one that strips were solved with."""
+        mine = self.weight * curve(self.passed)
+        total = float(np.abs(mine).sum())
+        return float(np.abs(mine - self.work).sum()) / max(total, 1e-300)
+
+
+def number(value: float, slopes: Mapping[str, Any] = MappingProxyType({})) -> Varying:
+    """A number with its derivatives by parameter."""
+    return Varying(np.asarray(value), {p: np.asarray(slope) for p, slope in slopes.items()})
+
+
+class SolvedStrips:
+    """What is known of the strips of some runs.
+
+    Args:
+        runs: with their measurements.
+        furthest: travel that each strip is solved up to [mm], (n_runs,).
+        speed: at which [mm/s], (n_runs,).
+        paths: of strips that were solved before, by their case and curve; is added to.
+
+    Attributes:
+        paths: as given.
+        failed: why strips stopped before their end, by what was changed.
+        surprises: root mean squares by which strips differed from what others had foretold of
+            their curve, shares of the force.
+        count: sets of strips that were solved.
+    """
+
+    def __init__(
+        self,
+        runs: Sequence[tuple[Measurement, Run]],
+        furthest: Array,
+        speed: Array,
+        paths: dict[tuple[str, Curve], StripPath],
+    ) -> None:
+        self._runs, self._furthest, self._speed = list(runs), furthest, speed
+        self._groups: list[npt.NDArray[np.int64]] | None = None
+        self._known: dict[str, list[Solved]] = {}
+        self.paths = paths
+        self.failed: dict[str, str] = {}
+        self.surprises: list[float] = []
+        self.count = 0
+
+    @property
+    def notes(self) -> list[str]:
+        """How often strips were solved, and how well the ones before had foretold them."""
+        found = [
+            f"The strips were solved {self.count} times, with curves m(γ) of their "
+            "crossings; in between forces follow to first order, with the angles as they were. "
+            "Where fits end they are solved as they are."
+        ]
+        if len(self.surprises) > 1:
+            off = 100.0 * float(np.median(self.surprises))
+            found.append(
+                f"That foretold the forces of the next strips to {off:.2g} % rms in the median."
+            )
+        return found
+
+    @property
+    def left_out(self) -> list[str]:
+        """Strips that stopped before their end."""
+        return [f"{key or 'pinned'}: {why}; left out." for key, why in self.failed.items()]
+
+    def solve(self, wanted: Sequence[Wanted], steps: int = STEPS) -> list[Solved | SolveError]:
+        """Sets of strips; with few steps, kept for others near by.
+
+        Returns:
+            Of each that is wanted the set, or why one of its strips stopped before its end.
+        """
+        tasks: dict[tuple[str, Curve], tuple[Any, Curve]] = {}
+        places = []
+        for changes, curve in wanted:
+            own = []
+            for (m, run), travel, pace in zip(self._runs, self._furthest, self._speed, strict=True):
+                case = strip_case(m, run, float(travel), float(pace), changes, steps)
+                own.append((case.model_dump_json(), curve))
+                if own[-1] not in self.paths:
+                    tasks.setdefault(own[-1], (case, curve))
+            places.append(own)
+        order = sorted(tasks, key=lambda key: -tasks[key][0].length_mm * tasks[key][0].width_mm)
+        stopped: dict[tuple[str, Curve], Exception] = {}
+        results = each_of(solved_strip, [tasks[key] for key in order])
+        for key, path in zip(order, results, strict=True):
+            (stopped if isinstance(path, Exception) else self.paths)[key] = path
+        found = []
+        for (changes, curve), own in zip(wanted, places, strict=True):
+            one = self._gathered(curve, [stopped.get(key) or self.paths[key] for key in own])
+            if isinstance(one, Solved):
+                self.count += 1
+                if steps == STEPS:
+                    self._known.setdefault(_key(changes), []).append(one)
+            found.append(one)
+        return found
+
+    def solved(self, changes: Mapping[str, Any], curve: Curve, steps: int = STEPS) -> Solved:
+        """One set of strips.
+
+        Raises:
+            SolveError: one of them stopped before its end.
+        """
+        (found,) = self.solve([(changes, curve)], steps)
+        if isinstance(found, SolveError):
+            raise found
+        return found
+
+    def nearest(self, wanted: Sequence[Wanted]) -> list[Solved]:
+        """The sets solved with a curve that is near, or now with this one; keys all different.
+
+        Raises:
+            SolveError: there are none, and none with this curve.
+        """
+        found = [self._near(*one) for one in wanted]
+        lacking = [k for k, one in enumerate(found) if one is None]
+        for k, one in zip(lacking, self.solve([wanted[k] for k in lacking]), strict=True):
+            changes, curve = wanted[k]
+            known = [other for other in self._known.get(_key(changes), []) if other is not one]
+            before = min(known, key=lambda other: other.apart(curve), default=None)
+            if isinstance(one, SolveError):
+                self.failed[_key(changes)] = str(one)
+                if before is None:
+                    raise one
+                one = before
+            elif before is not None:
+                self.surprises.append(self._surprise(one, before))
+            found[k] = one
+        return [one for one in found if one is not None]
+
+    def _near(self, changes: Mapping[str, Any], curve: Curve) -> Solved | None:
+        """The nearest set, where there is one near or no other can be solved."""
+        key = _key(changes)
+        known = self._known.get(key, [])
+        enough = len(known) >= MOST or key in self.failed
+        if not known:
+            if enough:
+                raise SolveError(self.failed[key])
+            return None
+        apart = [one.apart(curve) for one in known]
+        near = enough or curve.idle or min(apart) < NEAR
+        return known[int(np.argmin(apart))] if near else None
+
+    def _surprise(self, found: Solved, before: Solved) -> float:
+        """By how much strips differ from what others had foretold of their curve."""
+        off, size = [], []
+        for new, old, furthest in zip(found.ways, before.ways, self._furthest, strict=True):
+            D = np.linspace(0.0, furthest, TRAVELS)[1:]
+            force = new.force(D, found.curve)
+            off.append(force - old.force(D, found.curve))
+            size.append(force)
+        return float(np.linalg.norm(np.concatenate(off)) / np.linalg.norm(np.concatenate(size)))
+
+    def _gathered(
+        self, curve: Curve, paths: Sequence[StripPath | Exception]
+    ) -> Solved | SolveError:
+        """A set of the paths of its strips, their crossings in groups."""
+        whole: list[StripPath] = []
+        for path in paths:
+            if isinstance(path, SolveError):
+                return path
+            if isinstance(path, Exception):
+                raise path
+            whole.append(path)
+        if self._groups is None:
+            self._groups = [_alike(path) for path in whole]
+        ways = [_way(*one, curve) for one in zip(whole, self._groups, strict=True)]
+        return Solved.along(curve, ways, self._furthest)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """Solved strips among those of a model: their weight, and how much larger its forces are.
+
+    Attributes:
+        solved: the strips.
+        weight, size: numbers with their derivatives by parameter.
+    """
+
+    solved: Solved
+    weight: Varying
+    size: Varying = field(default_factory=lambda: number(1.0))
+
+
+def gamma_of(parts: Sequence[Part], D: Array, order: int) -> Varying:
+    """Angles of all groups, or derivatives in D (n_points, n_runs), (n_points, n_groups)."""
+    total = number(0.0)
+    for part in parts:
+        ways = part.solved.ways
+        own = np.hstack([way.gamma(D[:, r], order) for r, way in enumerate(ways)])
+        total += part.weight * Varying(own)
+    return total
+
+
+def of_ways(parts: Sequence[Part], D: Varying, name: str) -> Varying:
+    """What the ways of strips say, (n_points, n_runs): their rest, or the angle of the middle.
+
+    The first goes with the size of the forces.
+    """
+    total = number(0.0)
+    for part in parts:
+        value, change = (
+            np.stack(
+                [getattr(w, name)(D.value[:, r], k) for r, w in enumerate(part.solved.ways)],
+                axis=1,
+            )
+            for k in (0, 1)
+        )
+        own = Varying(value, {p: change * slope for p, slope in D.slopes.items()})
+        weight = part.weight * part.size if name == "rest" else part.weight
+        total += weight * own
+    return total
+
+
+def reached(solved: Solved, furthest: Array) -> Array:
+    """Weights of moments at KNOTS that make the work of all strips on their way, (n_knots,).
+
+    Of crossings that got to γ_c, Σ A ∫ m dγ from 0 to γ_c, with m straight between knots.
+    """
+    gamma = np.linspace(0.0, np.radians(KNOTS[-1]), ANGLES)
+    area = np.zeros_like(gamma)
+    for way, D in zip(solved.ways, furthest, strict=True):
+        area += np.sum(way.area * (way.gamma(D) > gamma[:, None]), axis=1)
+    shapes = np.stack([np.interp(gamma, np.radians(KNOTS), unit) for unit in np.eye(len(KNOTS))])
+    return np.asarray(shapes @ area * (gamma[1] - gamma[0]))
+
+
+def _way(path: StripPath, group: npt.NDArray[np.int64], curve: Curve) -> Way:
+    """A path with its crossings in groups."""
+    area = np.bincount(group, path.area, GROUPS).astype(np.float64)
+    gamma = np.stack([np.bincount(group, path.area * row, GROUPS) / area for row in path.gamma])
+    of_travel = PchipInterpolator(path.travel, gamma)
+    work = np.sum(area * of_travel(path.travel, 1) * curve(gamma), axis=1)
+    return Way(
+        area,
+        of_travel,
+        PchipInterpolator(path.travel, path.force - work),
+        PchipInterpolator(path.travel, path.middle),
+    )
+
+
+def _key(changes: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in changes.items())
+
+
+def _alike(path: StripPath) -> npt.NDArray[np.int64]:
+    """Group of each crossing, by its angle at the end; all groups have about the same area."""
+    order = np.argsort(path.gamma[-1], kind="stable")
+    share = np.cumsum(path.area[order]) / path.area.sum()
+    group = np.empty(len(order), dtype=np.int64)
+    group[order] = np.minimum((share * GROUPS * (1.0 - 1e-12)).astype(int), GROUPS - 1)
+    return group

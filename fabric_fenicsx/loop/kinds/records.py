@@ -1,0 +1,82 @@
+"""Records of a crosshead's motions side by side, point by point, and a crossing along them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...mechanics.laws.law import Crossing
+from ..expressions.marching import Marched, Varying
+from .picture_frame.motion import Motion
+
+__all__ = ["laid_out", "of_a_crossing", "shifted", "typical"]
+
+Array = npt.NDArray[np.float64]
+
+#: Time step [s] to the first point of a record.
+BEFORE = 1e-9
+
+
+def laid_out(
+    motions: Sequence[Motion],
+) -> tuple[dict[str, Varying], tuple[npt.NDArray[np.int64], ...]]:
+    """Records side by side; the shorter ones rest at their last point.
+
+    Returns:
+        By name, time [s], place D [mm] and speed D_rate [mm/s] of the crosshead and 1 over the step
+        to each point [1/s], (n_points, n_runs); and point and run of every reading, (n,) each.
+    """
+    longest = max(len(p.time) for p in motions)
+    shape = (longest, len(motions))
+    time, D, rate = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    places = []
+    for r, p in enumerate(motions):
+        count = len(p.time)
+        time[:count, r], D[:count, r], rate[:count, r] = p.time, p.displacement, p.rate
+        time[count:, r] = p.time[-1] + np.arange(1, longest - count + 1)
+        D[count:, r] = p.displacement[-1]
+        rows = np.flatnonzero(p.reading >= 0)
+        places.append((rows[np.argsort(p.reading[rows])], np.full(len(p.certain), r)))
+    step = np.diff(time, axis=0, prepend=time[:1])
+    # Nothing has happened before the first point.
+    step[0] = BEFORE
+    points = {
+        "time": Varying(time),
+        "D": Varying(D),
+        "D_rate": Varying(rate),
+        "per_time": Varying(1.0 / step),
+    }
+    return points, tuple(np.concatenate(part) for part in zip(*places, strict=True))
+
+
+def typical(rate: Array) -> float:
+    """Median of the rates [rad/s] where there is motion."""
+    moving = rate[rate > 1e-6 * float(rate.max())]
+    return float(np.median(moving)) if len(moving) else 1.0
+
+
+def of_a_crossing(marched: Marched, number: int) -> Crossing:
+    """What one of several laws may use, in symbols."""
+    at = marched.at
+    return Crossing(
+        at["gamma"],
+        at["gamma_n"],
+        at["per_time"],
+        lambda value: value,
+        partial(_remembered, marched, number),
+        at["rate"],
+    )
+
+
+def _remembered(marched: Marched, number: int, name: str) -> Any:
+    """A memory of one of several laws, which may use the same names."""
+    return marched.remembered(f"{number} {name}")
+
+
+def shifted(values: Array) -> Array:
+    """At the point before; at the first point the value there."""
+    return np.concatenate([values[:1], values[:-1]])

@@ -1,0 +1,117 @@
+"""Strips solved in several processes, with models that are kept: the same to the last bit."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from dataclasses import astuple
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fabric_fenicsx.errors import SolveError
+from fabric_fenicsx.loop import workers
+from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig, strip
+from fabric_fenicsx.loop.kinds.bias_extension.strip import KNOTS, Curve, solved_strip, strip_case
+from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
+
+GAMMA = np.radians(KNOTS)
+SOFT, STIFF = (Curve.through(k * (0.02 * GAMMA + 0.2 * GAMMA**3)) for k in (1.0, 5.0))
+SLIPPING = {"crossover.slip_limit_N": 0.3, "crossover.translation_N_mm": 10.0}
+CRIMPED = {"tow.crimp_strain": 0.02}
+
+
+def case(changes=None, length=40.0, travel=5.0):
+    own = {"length_mm": length, "width_mm": 20.0}
+    run = Run("run.csv", False, "", {}, own=own)
+    fabric = FabricKeys(areal_density_kg_m2=0.3, tow_spacing_mm=5.0)
+    measured = Measurement(Path(), "bias_extension", "", fabric, BiasExtensionRig(), None, (run,))
+    return strip_case(measured, run, travel, 1.0, changes or {}, steps=6)
+
+
+def hasty(case):
+    """One iteration is not enough for a step, whatever its length."""
+    keys = {"iteration_limit": 1, "smallest_step_s": case.solver.first_step_s}
+    return case.model_copy(update={"solver": case.solver.model_copy(update=keys)})
+
+
+def same(one, other):
+    return all(np.array_equal(a, b) for a, b in zip(astuple(one), astuple(other), strict=True))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, CRIMPED, SLIPPING],
+    ids=["pinned", "crimped", "slipping"],
+)
+def test_a_model_that_is_kept_remembers_nothing(changes):
+    """Neither what it did nor what it was: one that is pulled again is like a new one."""
+    strip._strip.cache_clear()
+    fresh = solved_strip(case(changes), SOFT)
+    other = {name: 1.7 * value for name, value in changes.items() if "translation" not in name}
+    between = solved_strip(case(changes | other), STIFF)
+    assert not same(fresh, between)
+    # One that stops on its way leaves its increment in the fields.
+    with pytest.raises(SolveError):
+        solved_strip(hasty(case(changes)), SOFT)
+    assert same(solved_strip(case(changes), SOFT), fresh)
+    strip._strip.cache_clear()
+    assert same(solved_strip(case(changes | other), STIFF), between)
+
+
+def test_processes_find_what_one_finds(monkeypatch):
+    tasks = [(case(length=length), curve) for length in (50.0, 40.0) for curve in (SOFT, STIFF)]
+    alone = [solved_strip(*task) for task in tasks]
+    monkeypatch.setattr(workers, "_cores", lambda: 2)
+    together = workers.each_of(solved_strip, [*tasks, (hasty(case()), SOFT)])
+    assert all(same(a, b) for a, b in zip(alone, together[:-1], strict=True))
+    assert isinstance(together[-1], SolveError)
+    # They last, each with an MPI of its own.
+    pids = set(workers.each_of(os.getpid, [(), (), ()]))
+    assert len(pids) in (1, 2) and os.getpid() not in pids
+    assert pids <= set(workers.each_of(os.getpid, [()] * 40))
+
+
+def test_beside_mpirun_there_are_none(monkeypatch):
+    """Its ranks have the cores, and a process that one of them starts is no rank."""
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "0")
+    assert workers.each_of(os.getpid, [(), (), ()]) == [os.getpid()] * 3
+
+
+ASKS = """
+import os, sys, time
+from fabric_fenicsx.loop import workers
+workers._cores = lambda: 2
+found = workers.each_of(os.getpid, [()] * 2 + [()] * 20)
+print(*[worker.process.pid for worker in workers._workers], flush=True)
+workers.each_of(time.sleep, [(3.0,)] * 4)
+"""
+
+
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.slow)]
+)
+def test_workers_end_with_whoever_asks(number):
+    """At once on Ctrl-C; where it has no time to end them, when their task is done."""
+    asking = subprocess.Popen(
+        [sys.executable, "-c", ASKS], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+    pids = [int(pid) for pid in asking.stdout.readline().split()]
+    time.sleep(0.5)
+    asking.send_signal(number)
+    asking.wait(20)
+    assert len(pids) == 2
+    until = time.monotonic() + 20.0
+    while any(map(alive, pids)) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not any(map(alive, pids))
+
+
+def alive(pid):
+    with suppress(OSError):
+        # One that has ended and that nobody has waited for is still listed.
+        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    return False
