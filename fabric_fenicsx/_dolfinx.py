@@ -113,7 +113,10 @@ def _compiling() -> Iterator[None]:
 
 
 def interval_mesh(
-    comm: MPI.Comm, points: npt.NDArray[np.float64], cells: npt.NDArray[np.int64]
+    comm: MPI.Comm,
+    points: npt.NDArray[np.float64],
+    cells: npt.NDArray[np.int64],
+    owners: npt.NDArray[np.int64] | None = None,
 ) -> Any:
     """A mesh of two-node intervals, every one of them given on rank 0.
 
@@ -121,6 +124,7 @@ def interval_mesh(
         comm: the communicator to distribute it on.
         points: node positions, shape (n_nodes, gdim); read on rank 0 only.
         cells: node numbers, shape (n_cells, 2); read on rank 0 only.
+        owners: rank of each cell, shape (n_cells,); read on rank 0 only. By default rank 0.
 
     Returns:
         The dolfinx mesh. Facets that two ranks share are ghosted, or an interior node would
@@ -130,14 +134,19 @@ def interval_mesh(
     if comm.rank != 0:
         points = np.zeros((0, gdim))
         cells = np.zeros((0, 2), dtype=np.int64)
+    if owners is None or comm.rank != 0:
+        owners = np.zeros(len(cells), dtype=np.int64)
+    # Of whichever arguments this version hands over: each rank's cells are those above.
+    destinations = _with_ghosts(cells, owners)
+
+    def partitioner(*_: Any) -> Any:
+        return dolfinx.cpp.graph.AdjacencyList_int32(*destinations)
+
     cells = np.ascontiguousarray(cells, dtype=np.int64)
     points = np.ascontiguousarray(points, dtype=np.float64)
     if _BASIX_UFL:
         element = basix.ufl.element("Lagrange", "interval", 1, shape=(gdim,))
         arguments = list(inspect.signature(create_mesh).parameters)
-        # Newer ones ask how many cells may meet at a node; tows do not branch.
-        most = [2] if "max_facet_to_cell_links" in arguments else []
-        partitioner = dolfinx.cpp.mesh.create_cell_partitioner(GhostMode.shared_facet, *most)
         if arguments.index("x") < arguments.index("e" if "e" in arguments else "domain"):
             return create_mesh(comm, cells, points, element, partitioner=partitioner)
         return create_mesh(comm, cells, element, points, partitioner=partitioner)
@@ -146,7 +155,35 @@ def interval_mesh(
         "Lagrange", ufl.Cell("interval", geometric_dimension=gdim), 1, dim=gdim,
         variant="equispaced",
     )  # fmt: skip
-    return create_mesh(comm, cells, points, ufl.Mesh(element), ghost_mode=GhostMode.shared_facet)
+    return create_mesh(
+        comm,
+        cells,
+        points,
+        ufl.Mesh(element),
+        ghost_mode=GhostMode.shared_facet,
+        partitioner=partitioner,
+    )
+
+
+def _with_ghosts(
+    cells: npt.NDArray[np.int64], owners: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+    """Ranks that need each cell, its owner first, and where those of each cell begin.
+
+    A rank needs its own cells and those that share a node with them.
+    """
+    count = len(cells)
+    order = np.argsort(cells.ravel(), kind="stable")
+    nodes, cell = cells.ravel()[order], order // 2
+    meet = np.flatnonzero(nodes[1:] == nodes[:-1])
+    at = np.concatenate([cell[meet], cell[meet + 1]])
+    needing = owners[np.concatenate([cell[meet + 1], cell[meet]])]
+    foreign = needing != owners[at]
+    ghosts = np.unique(np.column_stack([at[foreign], needing[foreign]]), axis=0)
+    at = np.concatenate([np.arange(count), ghosts[:, 0]])
+    ranks = np.concatenate([owners, ghosts[:, 1]])[np.argsort(at, kind="stable")]
+    begins = np.concatenate([[0], np.cumsum(np.bincount(at, minlength=count))])
+    return ranks.astype(np.int32), begins.astype(np.int32)
 
 
 def _space(mesh: Any, family: str, degree: int, size: int) -> Any:

@@ -24,6 +24,7 @@ from ..fabric.crossings import reference_angle
 from ..fabric.net import Net
 from ..mechanics.fields import ConnectorFields, TowFields
 from .blocks import BLOCK, block_matrix, expand
+from .partition import partition
 from .update import advance
 
 __all__ = ["BLOCK", "Discretisation"]
@@ -78,7 +79,8 @@ class Discretisation:
         whole = np.ones(len(net.crossings))
         self.interlacing = whole if interlacing is None else interlacing
         self.patch = whole if patch is None else patch
-        mesh = _dolfinx.interval_mesh(comm, net.points, net.cells)
+        owners = partition(net, comm.size) if comm.rank == 0 else None
+        mesh = _dolfinx.interval_mesh(comm, net.points, net.cells, owners)
         space = _dolfinx.lagrange(mesh, BLOCK)
         self._number(mesh, space)
 
@@ -220,7 +222,7 @@ class Discretisation:
     def cell_values(self, field: Any) -> Array:
         """Values of a field constant per cell at this rank's cells, (n_local_cells, size)."""
         dofs = _dolfinx.cell_dofs(field.function_space)[:, 0]
-        return field.x.array.reshape(len(dofs), -1)[dofs]
+        return field.x.array.reshape(-1, field.function_space.dofmap.index_map_bs)[dofs]
 
     def crossing_field(self, space: Any, values: Array) -> Function:
         """A connector field from values per crossing of the net, shape (n_crossings, size)."""

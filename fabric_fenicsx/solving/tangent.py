@@ -280,8 +280,8 @@ def _solver(comm: MPI.Comm, prefix: str, symmetric: bool, **more: Any) -> PETSc.
 
 
 def _ordering(comm: MPI.Comm) -> dict[str, int]:
-    """MUMPS' ordering found best on these nets: METIS (PORD without it), on several ranks AMF."""
-    return {"mat_mumps_icntl_7": 5 if comm.size == 1 else 2}
+    """MUMPS' ordering found best on these nets: METIS (PORD without it), on several ranks PORD."""
+    return {"mat_mumps_icntl_7": 5 if comm.size == 1 else 4}
 
 
 def _owners(disc: Discretisation) -> npt.NDArray[np.int64]:
