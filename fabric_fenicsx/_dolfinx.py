@@ -13,7 +13,8 @@ Offered:
     compile_form: UFL to machine code, once for all ranks.
     compile_source: a C file to functions, by the same compiler into the same cache.
     add_vector, add_matrix: a compiled form's contribution to an array or a matrix.
-    cell_scalar: the integral of a compiled functional over this rank's own cells.
+    pack: the values of a compiled form's coefficients.
+    cell_sums: what a linear form over constants per cell has on this rank's own cells, summed.
     cell_vertices, cell_dofs, input_nodes, input_cells: the numbering maps.
 """
 
@@ -63,7 +64,7 @@ __all__ = [
     "add_vector",
     "atan2",
     "cell_dofs",
-    "cell_scalar",
+    "cell_sums",
     "compile_form",
     "compile_seconds",
     "compile_source",
@@ -73,6 +74,7 @@ __all__ = [
     "input_nodes",
     "interval_mesh",
     "lagrange",
+    "pack",
     "version",
 ]
 
@@ -345,9 +347,26 @@ def add_matrix(matrix: PETSc.Mat, form: Any) -> None:
         )
 
 
-def cell_scalar(form: Any) -> float:
-    """Integral of a functional over this rank's own cells (sum over ranks for the whole)."""
-    return float(sum(fem.assemble_scalar(part) for part in form))
+def pack(form: Any) -> list[Any]:
+    """Values of a compiled form's coefficients as they are now, for several evaluations."""
+    return [dolfinx.cpp.fem.pack_coefficients(getattr(part, "_cpp_object", part)) for part in form]
+
+
+def cell_sums(form: Any, space: Any, packed: list[Any] | None = None) -> npt.NDArray[np.float64]:
+    """Sum over this rank's own cells of a linear form over constants per cell.
+
+    Args:
+        form: the compiled form.
+        space: of the constants, with n components.
+        packed: values of the coefficients, see ``pack``; by default as they are.
+
+    Returns:
+        The sum of each component, (n,).
+    """
+    shares = np.zeros((local_cells(space.mesh), space.dofmap.index_map_bs))
+    for part, coefficients in zip(form, pack(form) if packed is None else packed, strict=True):
+        fem.assemble_vector(shares.ravel(), part, coeffs=coefficients)
+    return np.asarray(shares.sum(axis=0))
 
 
 def cell_dofs(space: Any) -> npt.NDArray[np.int64]:

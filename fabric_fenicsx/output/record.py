@@ -135,7 +135,7 @@ class Record:
             "iterations": step.iterations,
             "failed_attempts": step.failures,
         }
-        row |= self._balance.step(step.time, outside)
+        row |= self._balance.step(step, outside)
         self.gaps = model.gaps()
         for tool, gap in self.gaps.items():
             row[f"{tool}_penetration_mm"] = max(0.0, -float(gap.min()))
