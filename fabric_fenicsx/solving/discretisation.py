@@ -79,6 +79,7 @@ class Discretisation:
         whole = np.ones(len(net.crossings))
         self.interlacing = whole if interlacing is None else interlacing
         self.patch = whole if patch is None else patch
+        self._numbers: dict[str, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = {}
         owners = partition(net, comm.size) if comm.rank == 0 else None
         mesh = _dolfinx.interval_mesh(comm, net.points, net.cells, owners)
         space = _dolfinx.lagrange(mesh, BLOCK)
@@ -330,28 +331,50 @@ class Discretisation:
             PETSc.LGMap().create(connectors.astype(PETSc.IntType), bsize=BLOCK, comm=comm),
         )
 
-    def gather_nodes(self, local: Array) -> Array:
-        """Rows per owned block of every rank, in the order of the net's nodes, on every rank."""
-        size = local.shape[1]
-        parts = self.comm.allgather((self.local_nodes[: self.owned], local[: self.owned]))
-        whole = np.zeros((len(self.net.points), size))
-        for nodes, values in parts:
-            whole[nodes] = values
-        return whole
+    def gather_nodes(self, local: Array, *, to: int | None = None) -> Array:
+        """Rows per owned block of every rank, in the order of the net's nodes. Collective.
 
-    def gather_cells(self, local: Array) -> Array:
-        """Rows per owned cell of every rank, in the order of the net's cells, on every rank."""
-        whole = np.zeros((len(self.net.cells), local.shape[1]))
+        Args:
+            local: of this rank, (n_owned, size).
+            to: the rank that gets them; the others get nothing, (0, size). None: every rank.
+        """
+        return self._gather("nodes", self.local_nodes[: self.owned], local, to)
+
+    def gather_cells(self, local: Array, *, to: int | None = None) -> Array:
+        """Rows per owned cell of every rank, in the order of the net's cells. Collective.
+
+        Args:
+            local: of this rank, (n_owned_cells, size); rows of ghosts may follow.
+            to: see ``gather_nodes``.
+        """
         count = len(self.owned_cells)
-        for cells, values in self.comm.allgather((self.owned_cells, local[:count])):
-            whole[cells] = values
-        return whole
+        return self._gather("cells", self.owned_cells, local[:count], to)
 
-    def gather_crossings(self, local: Array) -> Array:
-        """Rows per crossing of every rank, in the order of the net's crossings, on every rank."""
-        whole = np.zeros((len(self.net.crossings), local.shape[1]))
-        for crossings, values in self.comm.allgather((self.local_crossings, local)):
-            whole[crossings] = values
+    def gather_crossings(self, local: Array, *, to: int | None = None) -> Array:
+        """Rows per crossing of every rank, in the order of the net's crossings. Collective.
+
+        Args:
+            local: of this rank, (n_local_crossings, size).
+            to: see ``gather_nodes``.
+        """
+        return self._gather("crossings", self.local_crossings, local, to)
+
+    def _gather(self, kind: str, own: Any, local: Array, to: int | None) -> Array:
+        comm = self.comm
+        if kind not in self._numbers:
+            # Which rows of the whole each rank has, told once.
+            parts = comm.allgather(own)
+            self._numbers[kind] = np.concatenate(parts), np.array([len(part) for part in parts])
+        numbers, counts = self._numbers[kind]
+        here = to is None or comm.rank == to
+        rows, whole = np.zeros((2, len(numbers) if here else 0, local.shape[1]))
+        sent = np.ascontiguousarray(local, dtype=np.float64)
+        if to is None:
+            comm.Allgatherv(sent, (rows, counts * local.shape[1]))
+        else:
+            comm.Gatherv(sent, (rows, counts * local.shape[1]) if here else None, root=to)
+        if here:
+            whole[numbers] = rows
         return whole
 
     def everywhere(self, update: Callable[[Any], None]) -> None:
