@@ -174,20 +174,28 @@ class DyadicLU:
 
     def __init__(self, tangent: Whole | Condensed, dyads: Callable[[], list[Dyad]]) -> None:
         self._tangent, self._dyads = tangent, dyads
+        self._new: list[Dyad] = []
         self._solved: list[Dyad] = []
 
     def setUp(self, pc: PETSc.PC) -> None:
-        """Factorise, and solve for every dyad's column."""
+        """Factorise."""
         self._tangent.factorise()
-        self._solved = []
-        for column, row, s in self._dyads():
-            p = column.duplicate()
-            self.apply(pc, column, p)
-            self._solved.append((p, row, s - row.dot(p)))
+        self._new, self._solved = self._dyads(), []
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = (A − Σ dyads)⁻¹ b."""
-        if not self._tangent.solve(b, y):
+        """Y = (A − Σ dyads)⁻¹ b; the first time with every dyad's column beside b."""
+        columns = [column for column, _, _ in self._new]
+        found = [column.duplicate() for column in columns]
+        if not self._tangent.solve([b, *columns], [y, *found]):
             fail(pc)
+            return
+        for p, (_, row, s) in zip(found, self._new, strict=True):
+            self._take_off(p)
+            self._solved.append((p, row, s - row.dot(p)))
+        self._new = []
+        self._take_off(y)
+
+    def _take_off(self, y: PETSc.Vec) -> None:
+        """What the dyads solved so far do to a solution."""
         for p, row, rest in self._solved:
             y.axpy(row.dot(y) / rest, p)
