@@ -13,7 +13,8 @@ Offered:
     compile_form: UFL to machine code, once for all ranks.
     compile_source: a C file to functions, by the same compiler into the same cache.
     add_vector, add_matrix: a compiled form's contribution to an array or a matrix.
-    cell_scalar: the integral of a compiled functional over this rank's own cells.
+    pack: the values of a compiled form's coefficients.
+    cell_sums: what a linear form over constants per cell has on this rank's own cells, summed.
     cell_vertices, cell_dofs, input_nodes, input_cells: the numbering maps.
 """
 
@@ -63,7 +64,7 @@ __all__ = [
     "add_vector",
     "atan2",
     "cell_dofs",
-    "cell_scalar",
+    "cell_sums",
     "compile_form",
     "compile_seconds",
     "compile_source",
@@ -73,6 +74,7 @@ __all__ = [
     "input_nodes",
     "interval_mesh",
     "lagrange",
+    "pack",
     "version",
 ]
 
@@ -113,7 +115,10 @@ def _compiling() -> Iterator[None]:
 
 
 def interval_mesh(
-    comm: MPI.Comm, points: npt.NDArray[np.float64], cells: npt.NDArray[np.int64]
+    comm: MPI.Comm,
+    points: npt.NDArray[np.float64],
+    cells: npt.NDArray[np.int64],
+    owners: npt.NDArray[np.int64] | None = None,
 ) -> Any:
     """A mesh of two-node intervals, every one of them given on rank 0.
 
@@ -121,6 +126,7 @@ def interval_mesh(
         comm: the communicator to distribute it on.
         points: node positions, shape (n_nodes, gdim); read on rank 0 only.
         cells: node numbers, shape (n_cells, 2); read on rank 0 only.
+        owners: rank of each cell, shape (n_cells,); read on rank 0 only. By default rank 0.
 
     Returns:
         The dolfinx mesh. Facets that two ranks share are ghosted, or an interior node would
@@ -130,14 +136,19 @@ def interval_mesh(
     if comm.rank != 0:
         points = np.zeros((0, gdim))
         cells = np.zeros((0, 2), dtype=np.int64)
+    if owners is None or comm.rank != 0:
+        owners = np.zeros(len(cells), dtype=np.int64)
+    # Of whichever arguments this version hands over: each rank's cells are those above.
+    destinations = _with_ghosts(cells, owners)
+
+    def partitioner(*_: Any) -> Any:
+        return dolfinx.cpp.graph.AdjacencyList_int32(*destinations)
+
     cells = np.ascontiguousarray(cells, dtype=np.int64)
     points = np.ascontiguousarray(points, dtype=np.float64)
     if _BASIX_UFL:
         element = basix.ufl.element("Lagrange", "interval", 1, shape=(gdim,))
         arguments = list(inspect.signature(create_mesh).parameters)
-        # Newer ones ask how many cells may meet at a node; tows do not branch.
-        most = [2] if "max_facet_to_cell_links" in arguments else []
-        partitioner = dolfinx.cpp.mesh.create_cell_partitioner(GhostMode.shared_facet, *most)
         if arguments.index("x") < arguments.index("e" if "e" in arguments else "domain"):
             return create_mesh(comm, cells, points, element, partitioner=partitioner)
         return create_mesh(comm, cells, element, points, partitioner=partitioner)
@@ -146,7 +157,35 @@ def interval_mesh(
         "Lagrange", ufl.Cell("interval", geometric_dimension=gdim), 1, dim=gdim,
         variant="equispaced",
     )  # fmt: skip
-    return create_mesh(comm, cells, points, ufl.Mesh(element), ghost_mode=GhostMode.shared_facet)
+    return create_mesh(
+        comm,
+        cells,
+        points,
+        ufl.Mesh(element),
+        ghost_mode=GhostMode.shared_facet,
+        partitioner=partitioner,
+    )
+
+
+def _with_ghosts(
+    cells: npt.NDArray[np.int64], owners: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+    """Ranks that need each cell, its owner first, and where those of each cell begin.
+
+    A rank needs its own cells and those that share a node with them.
+    """
+    count = len(cells)
+    order = np.argsort(cells.ravel(), kind="stable")
+    nodes, cell = cells.ravel()[order], order // 2
+    meet = np.flatnonzero(nodes[1:] == nodes[:-1])
+    at = np.concatenate([cell[meet], cell[meet + 1]])
+    needing = owners[np.concatenate([cell[meet + 1], cell[meet]])]
+    foreign = needing != owners[at]
+    ghosts = np.unique(np.column_stack([at[foreign], needing[foreign]]), axis=0)
+    at = np.concatenate([np.arange(count), ghosts[:, 0]])
+    ranks = np.concatenate([owners, ghosts[:, 1]])[np.argsort(at, kind="stable")]
+    begins = np.concatenate([[0], np.cumsum(np.bincount(at, minlength=count))])
+    return ranks.astype(np.int32), begins.astype(np.int32)
 
 
 def _space(mesh: Any, family: str, degree: int, size: int) -> Any:
@@ -313,9 +352,26 @@ def add_matrix(matrix: PETSc.Mat, form: Any) -> None:
         )
 
 
-def cell_scalar(form: Any) -> float:
-    """Integral of a functional over this rank's own cells (sum over ranks for the whole)."""
-    return float(sum(fem.assemble_scalar(part) for part in form))
+def pack(form: Any) -> list[Any]:
+    """Values of a compiled form's coefficients as they are now, for several evaluations."""
+    return [dolfinx.cpp.fem.pack_coefficients(getattr(part, "_cpp_object", part)) for part in form]
+
+
+def cell_sums(form: Any, space: Any, packed: list[Any] | None = None) -> npt.NDArray[np.float64]:
+    """Sum over this rank's own cells of a linear form over constants per cell.
+
+    Args:
+        form: the compiled form.
+        space: of the constants, with n components.
+        packed: values of the coefficients, see ``pack``; by default as they are.
+
+    Returns:
+        The sum of each component, (n,).
+    """
+    shares = np.zeros((local_cells(space.mesh), space.dofmap.index_map_bs))
+    for part, coefficients in zip(form, pack(form) if packed is None else packed, strict=True):
+        fem.assemble_vector(shares.ravel(), part, coeffs=coefficients)
+    return np.asarray(shares.sum(axis=0))
 
 
 def cell_dofs(space: Any) -> npt.NDArray[np.int64]:

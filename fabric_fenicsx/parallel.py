@@ -8,7 +8,7 @@ from typing import Any
 
 from .errors import InputError, SolveError
 
-__all__ = ["from_root", "launched", "rank", "world"]
+__all__ = ["from_root", "launched", "neighbour", "rank", "world"]
 
 NAMES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 
@@ -43,6 +43,16 @@ def world() -> Any:
         for name in wanted:
             del os.environ[name]
     return MPI.COMM_WORLD
+
+
+def neighbour(comm: Any) -> int:
+    """A rank beside rank 0 on its machine, to share what is written; 0 if none is. Collective."""
+    from mpi4py import MPI
+
+    machine = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    beside = machine.allgather(comm.rank)
+    machine.Free()
+    return int(comm.bcast(beside[min(1, len(beside) - 1)]))
 
 
 def from_root(comm: Any, load: Callable[[], Any]) -> Any:

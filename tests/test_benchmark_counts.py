@@ -5,9 +5,18 @@ the libraries; a change that costs more has to be looked at.
 """
 
 import importlib.util
+from collections import Counter
 from pathlib import Path
 
 import pytest
+
+from fabric_fenicsx import _dolfinx
+from fabric_fenicsx.rigs.run import make_case, run
+from fabric_fenicsx.solving import tangent
+from fabric_fenicsx.solving.contacts import Contacts
+from fabric_fenicsx.solving.discretisation import Discretisation
+from fabric_fenicsx.solving.newton import Newton
+from fabric_fenicsx.solving.system import System
 
 SPEC = importlib.util.spec_from_file_location(
     "network", Path(__file__).parent / "benchmarks" / "network.py"
@@ -60,3 +69,53 @@ def test_sheet_converges_with_the_cells():
     """
     z = [network.sheet(5, sub)["z_corner"] for sub in (4, 8, 16)]
     assert (z[1] - z[0]) / (z[2] - z[1]) == pytest.approx(2.0, abs=0.25)
+
+
+def counted_drape(folder, monkeypatch, **keys):
+    """A short drape, how often what was called in it, and how often words were the answer."""
+    count = Counter()
+
+    def counted(place, name):
+        whole = getattr(place, name)
+
+        def called(*args, **kwargs):
+            found = whole(*args, **kwargs)
+            count[name] += 1
+            count[f"{name} found"] += isinstance(found, str) and bool(found)
+            return found
+
+        monkeypatch.setattr(place, name, called)
+
+    counted(System, "residual")
+    counted(Newton, "_function")
+    counted(Newton, "solve")
+    counted(Contacts, "firm_up")
+    counted(Discretisation, "_gather")
+    counted(_dolfinx, "cell_sums")
+    counted(tangent, "_solved")
+    sheet = {"warp_spacing_mm": 24.0, "weft_spacing_mm": 24.0}
+    case = make_case("drape", sheet=sheet, punch_travel_mm=5.0, duration_s=5.0, **keys)
+    result = run(case, folder, pictures=False)
+    assert result["completed"]
+    assert result["steps"] >= 5
+    return count, result
+
+
+def test_what_a_step_of_a_drape_costs_beside_its_iterations(tmp_path, monkeypatch):
+    """No residual that Newton has, one form for all energies of a mesh, one message for each kind.
+
+    Gathered for what is seen are nodes, cells, angles, moments and distances, for the state nodes,
+    and memories of nodes, cells and crossings.
+    """
+    count, result = counted_drape(tmp_path, monkeypatch)
+    steps = result["steps"]
+    assert count["residual"] == count["_function"] + count["firm_up found"]
+    assert count["cell_sums"] == 4 * steps
+    assert count["_gather"] == 9 * steps
+
+
+def test_a_pushed_tool_costs_no_solution_of_its_own(tmp_path, monkeypatch):
+    """Its column is solved for with the residual: once an iteration, counted or given up."""
+    count, result = counted_drape(tmp_path, monkeypatch, holder_force_N=80.0)
+    given_up = count["solve"] - result["steps"]
+    assert count["_solved"] <= result["newton_iterations"] + given_up

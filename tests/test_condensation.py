@@ -102,7 +102,7 @@ def both(system, *, held=()):
         x, y = disc.vector(), disc.vector()
         K.assemble()
         K.factorise()
-        assert K.solve(b, x)
+        assert K.solve([b], [x])
         K.mult(b, y)
         found += [disc.gather_nodes(v.array_r.reshape(-1, BLOCK)) for v in (x, y)]
     return condensed, found
@@ -127,6 +127,28 @@ def test_condensed_and_whole_matrix_have_one_solution(symmetric):
     if system.net.comm.size == 1:
         # Two nodes at each crossing and two ends of each tow are left.
         assert condensed.unknowns == BLOCK * (2 * 12 + 2 * 7)
+
+
+@pytest.mark.mpi
+@KINDS
+def test_right_hand_sides_are_solved_for_together(symmetric):
+    """As one by one, by the condensed and by the whole matrix."""
+    system = Blocks(plain_net(3, 4, 4.0, 4), symmetric=symmetric)
+    disc = system.net
+    free = disc.vector()
+    free.set(1.0)
+    b = right_hand_side(disc)
+    c = b.copy()
+    c.array[:] = np.cos(b.array_r)
+    for K in (both(system)[0], Whole(system, free, symmetric, PREFIX[symmetric])):
+        K.assemble()
+        K.factorise()
+        x, y, one = (disc.vector() for _ in range(3))
+        assert K.solve([b, c], [x, y])
+        for right, together in ((b, x), (c, y)):
+            assert K.solve([right], [one])
+            one.axpy(-1.0, together)
+            assert one.norm() <= 1e-11 * together.norm()
 
 
 @KINDS
@@ -177,13 +199,15 @@ def test_chains_of_one_bad_tangent_are_tried_again(symmetric):
     system.size = 0.0
     condensed.assemble()
     condensed.factorise()
-    assert not condensed.solve(b, y)
+    assert not condensed.solve([b], [y])
+    condensed.factorise()
+    assert not condensed.solve([b, b], [y, y.duplicate()])
     assert condensed.unknowns == b.local_size
     system.size = 1.0
     condensed.assemble()
     for _ in range(tangent.AGAIN + 1):
         condensed.factorise()
-        assert condensed.solve(b, y)
+        assert condensed.solve([b], [y])
         again = system.net.gather_nodes(y.array_r.reshape(-1, BLOCK))
         np.testing.assert_allclose(again, x, rtol=0, atol=1e-10 * np.abs(x).max())
     assert condensed.unknowns == unknowns

@@ -35,7 +35,7 @@ def swinging(end, step, observe, *, radius=0.9):
     newton = model.newton(force_tolerance=1e-10, limit=30)
     stepper = Stepper(model, newton, StepControl(step, step / 100.0, step))
     stepper.start_consistently()
-    stepper.observe = lambda record: observe(model, record.time)
+    stepper.observe = lambda step: observe(model, step)
     stepper.run(end)
 
 
@@ -48,10 +48,10 @@ def test_momentum_rate_is_what_acts_from_outside():
     """
     worst, size, ball = np.zeros(6), np.zeros(6), []
 
-    def observe(model, time):
+    def observe(model, step):
         momentum = Momentum(model)
         rate = momentum.wrench(model.system.term_forces("inertia"))
-        outside = momentum.external(model.outside())
+        outside = momentum.external(model.outside(), step.reactions)
         np.maximum(worst, np.abs(rate - outside), out=worst)
         np.maximum(size, np.abs(outside), out=size)
         ball.append(np.linalg.norm(model.tool_forces()["ball"]))
@@ -73,10 +73,10 @@ def test_momentum_is_the_impulse():
     for step in (0.01, 0.005, 0.0025):
         rows, balance = [], []
 
-        def observe(model, time, rows=rows, balance=balance):
+        def observe(model, step, rows=rows, balance=balance):
             if not balance:
                 balance.append(Balance(model))
-            rows.append(balance[0].step(time, model.outside()))
+            rows.append(balance[0].step(step, model.outside()))
 
         swinging(0.4, step, observe)
         momentum, impulse = (

@@ -177,20 +177,28 @@ def _on_tow(
     signs, counted = np.array(sign), np.array(whole)
     nodes = np.repeat(line[:, None], 2 * reach + 1, axis=1)
     weights = np.zeros((len(line), 2 * reach + 1, 3))
-    for k in range(len(line)):
-        i = offset + k
-        low, high = i - reach, i + reach + 1
-        if low < 0 or high > len(arc) or not counted[low:high].all():
-            low = max(min(i - 1, len(arc) - 3), 0)
-            high = min(low + 3, len(arc))
-        size = high - low
-        nodes[k, :size] = stations[low:high]
-        weights[k, :size] = _slope_weights(arc[low:high] - arc[i])[:, None] * signs[low:high]
+    i = offset + np.arange(len(line))
+    low, high = i - reach, i + reach + 1
+    missing = np.append(0, np.cumsum(~counted))
+    inside = (low >= 0) & (high <= len(arc))
+    wide = inside & (missing[np.minimum(high, len(arc))] == missing[np.maximum(low, 0)])
+    low = np.where(wide, low, np.maximum(np.minimum(i - 1, len(arc) - 3), 0))
+    sizes = np.where(wide, 2 * reach + 1, np.minimum(3, len(arc) - low))
+    for size in np.unique(sizes):
+        own = np.flatnonzero(sizes == size)
+        at_once = low[own, None] + np.arange(size)
+        nodes[own, :size] = stations[at_once]
+        slopes = _slope_weights(arc[at_once] - arc[i[own], None])
+        weights[own, :size] = slopes[:, :, None] * signs[at_once]
     return nodes, weights
 
 
 def _slope_weights(x: Floats) -> Floats:
-    """Weights of the values at x in the slope at 0 of the polynomial through them."""
-    scale = np.abs(x).max()
-    powers = np.vander(x / scale, increasing=True).T
-    return np.linalg.solve(powers, np.eye(len(x))[1]) / scale
+    """Weights of the values at x (n, m) in the slopes at 0 of the polynomials through them."""
+    scale = np.abs(x).max(axis=1, keepdims=True)
+    # Rows x⁰, x¹, x², ...
+    powers = np.repeat((x / scale)[:, None, :], x.shape[1], axis=1)
+    powers[:, 0] = 1.0
+    np.multiply.accumulate(powers, axis=1, out=powers)
+    slope = np.eye(x.shape[1])[None, :, 1:2]
+    return np.linalg.solve(powers, np.repeat(slope, len(x), axis=0))[:, :, 0] / scale

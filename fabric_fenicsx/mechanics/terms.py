@@ -6,14 +6,16 @@ that the rest of the model need not know of.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import ufl
 from ufl import derivative
 
 from .fields import ConnectorFields, TowFields
 
-__all__ = ["Term", "energy_term", "work_term"]
+__all__ = ["Term", "energy_term", "side_by_side", "work_term"]
 
 Where = Literal["tows", "crossovers"]
 
@@ -64,6 +66,24 @@ def work_term(
     if tangent is None:
         tangent = derivative(residual, fields.w, fields.trial)
     return Term(name, _where(fields), residual, tangent, energy, loss, symmetric)
+
+
+def side_by_side(integrals: Sequence[Any], space: Any) -> Any:
+    """A linear form whose vector over ``space`` has each integral's share of each cell.
+
+    So several are assembled at once, what they have in common being evaluated once.
+
+    Args:
+        integrals: functionals on one mesh.
+        space: constant in each cell, with a component for each.
+    """
+    test = ufl.TestFunction(space)
+    components = [test] if len(integrals) == 1 else [test[i] for i in range(len(integrals))]
+    shares = [
+        ufl.Form([part.reconstruct(part.integrand() * component) for part in whole.integrals()])
+        for whole, component in zip(integrals, components, strict=True)
+    ]
+    return sum(shares[1:], start=shares[0])
 
 
 def _where(fields: TowFields | ConnectorFields) -> Where:

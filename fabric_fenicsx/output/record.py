@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from ..errors import InputError
 from ..fabric.net import Net
-from ..parallel import from_root
+from ..parallel import from_root, neighbour
 from ..solving.balance import Balance
 from ..solving.model import Model
 from ..solving.predictor import DEPTH
@@ -51,7 +51,9 @@ RECENT = 200
 
 
 class Record:
-    """Writes steps as they are accepted. Every method is collective; rank 0 writes.
+    """Writes steps as they are accepted. Every method is collective.
+
+    Rank 0 writes what is seen of them, its ``neighbour`` the step files.
 
     What is held does not grow with the number of steps.
 
@@ -81,7 +83,7 @@ class Record:
         self.recent: deque[dict[str, float]] = deque(maxlen=RECENT)
         self.gaps: dict[str, npt.NDArray[np.float64]] = {}
         self.steps, self._table = folder / "steps", folder / "steps.csv"
-        self._root = model.comm.rank == 0
+        self._root, self._keeper = model.comm.rank == 0, neighbour(model.comm)
         self._columns: list[str] = []
         self._seen: dict[str, npt.NDArray[np.float64]] = {}
         if self._root:
@@ -135,7 +137,7 @@ class Record:
             "iterations": step.iterations,
             "failed_attempts": step.failures,
         }
-        row |= self._balance.step(step.time, outside)
+        row |= self._balance.step(step, outside)
         self.gaps = model.gaps()
         for tool, gap in self.gaps.items():
             row[f"{tool}_penetration_mm"] = max(0.0, -float(gap.min()))
@@ -154,7 +156,8 @@ class Record:
 
     def keep(self, step: Step, stepper: Stepper) -> None:
         """Write the accepted state, and what `observe` has seen of it."""
-        disc, state, predictor = self.model.disc, stepper.state, stepper.predictor
+        model, state, predictor = self.model, stepper.state, stepper.predictor
+        disc = model.disc
         n = disc.owned
         arrays = {
             "u": disc.tows.u_n.x.array.reshape(-1, 3),
@@ -164,9 +167,10 @@ class Record:
             "a": state.a,
             "previous": np.hstack(list(predictor.past)),
         }
-        whole = {name: disc.gather_nodes(values[:n]) for name, values in arrays.items()}
-        histories = self.model.histories.save()
-        if self._root:
+        together = np.hstack([values[:n] for values in arrays.values()])
+        whole = disc.gather_nodes(together, to=self._keeper)
+        histories = model.histories.save(to=self._keeper)
+        if model.comm.rank == self._keeper:
             scalars = {
                 "schema": STEP_SCHEMA,
                 "time": step.time,
@@ -176,11 +180,13 @@ class Record:
                 "last_step": state.last_step,
                 "next_step": state.next_step,
             }
-            arrays = {name: np.asarray(value) for name, value in scalars.items()} | whole
-            arrays |= self._seen
-            arrays |= {f"history: {name}": values for name, values in histories.items()}
+            parts = np.hsplit(whole, np.cumsum([STATE[name] for name in arrays])[:-1])
+            written = {name: np.asarray(value) for name, value in scalars.items()}
+            written |= dict(zip(arrays, parts, strict=True))
+            written |= self._seen
+            written |= {f"history: {name}": values for name, values in histories.items()}
             path = self.steps / f"step_{step.number:05d}.npz"
-            write_npz(path, arrays, compressed=False, durable=True)
+            write_npz(path, written, compressed=False, durable=True)
 
 
 def _read_table(path: Path) -> tuple[list[str], list[dict[str, float]]]:

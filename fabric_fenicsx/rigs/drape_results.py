@@ -8,6 +8,7 @@ import numpy as np
 
 from ..fabric.axes import axes_shear, shear_at
 from ..fabric.net import Net
+from ..parallel import neighbour
 from .common import Session, extend, lowest, write_table
 from .discretisation_error import recovered_error
 from .drape import DrapeCase, mirrors, rim
@@ -54,7 +55,7 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             "points": _points(case, session, net, outcome),
         }
         summary["discretisation_error"] = recovered_error(net, snapshot, mirrors(case))
-        if session.root and session.pictures:
+        if session.pictures:
             _draw(case, session, model, snapshot)
     return extend(summary, quantities, session)
 
@@ -103,6 +104,11 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
 
 
 def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -> None:
+    """Two pictures, each by a rank of its own where two can write."""
+    comm = session.comm
+    writers = sorted({0, neighbour(comm)})
+    if comm.rank not in writers:
+        return
     from ..output.mirror import whole_sheet
     from ..output.pictures import draw_net
     from ..output.surfaces import tool_surface
@@ -113,10 +119,11 @@ def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -
     net = model.net
     if case.symmetry == "quarter":
         net, snapshot = whole_sheet(net, snapshot)
-    for view, shown in (
-        ("perspective", [s for s in surfaces if s.name != "holder"]),
+    views = (
         ("top", [s for s in surfaces if s.name == "die"]),
-    ):
+        ("perspective", [s for s in surfaces if s.name != "holder"]),
+    )
+    for view, shown in views[writers.index(comm.rank) :: len(writers)]:
         draw_net(
             session.folder / f"drape_{view}.png",
             net,

@@ -128,6 +128,8 @@ def simulate(
             stepper.predictor.forget()
     except SolveError as error:
         stop = str(error)
+    # The last step file may be another rank's.
+    model.comm.barrier()
     seconds = {
         "total": perf_counter() - started,
         "compile": _dolfinx.compile_seconds[0],

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from .model import Model
 from .momentum import Momentum
+from .stepping import Step
 
 __all__ = ["Balance"]
 
@@ -59,11 +60,11 @@ class Balance:
         if "external_force_x_N" in past:
             self._wrench = _read(past, "external_force_{}_N", "external_moment_{}_N_mm")
 
-    def step(self, time: float, outside: dict[str, Array]) -> dict[str, float]:
-        """Columns for a converged step that ends at ``time``, its increment still in the fields.
+    def step(self, step: Step, outside: dict[str, Array]) -> dict[str, float]:
+        """Columns for a converged step, its increment still in the fields.
 
         Args:
-            time: end of the step [s].
+            step: the step.
             outside: what acts from outside, as of ``Model.outside``.
         """
         model = self.model
@@ -85,7 +86,7 @@ class Balance:
         row |= {f"energy_{name.replace(' ', '_')}_N_mm": e for name, e in energies.items()}
         return (
             row
-            | self._momenta(time, outside)
+            | self._momenta(step, outside)
             | {
                 "external_work_N_mm": self.external,
                 "stored_N_mm": stored,
@@ -95,14 +96,14 @@ class Balance:
             }
         )
 
-    def _momenta(self, time: float, outside: dict[str, Array]) -> dict[str, float]:
+    def _momenta(self, step: Step, outside: dict[str, Array]) -> dict[str, float]:
         """Momentum, impulse and what acts from outside; nothing in statics."""
         if self._momentum is None:
             return {}
-        wrench = self._momentum.external(outside) * self._whole + 0.0
+        wrench = self._momentum.external(outside, step.reactions) * self._whole + 0.0
         before = wrench if self._wrench is None else self._wrench
-        self._impulse += (before + wrench) / 2.0 * (time - self._time)
-        self._wrench, self._time = wrench, time
+        self._impulse += (before + wrench) / 2.0 * (step.time - self._time)
+        self._wrench, self._time = wrench, step.time
         momentum = self._momentum.momentum() * self._whole + 0.0
         columns = _columns(momentum, "momentum_{}_N_s", "angular_momentum_{}_N_mm_s")
         columns |= _columns(self._impulse, "impulse_{}_N_s", "angular_impulse_{}_N_mm_s")

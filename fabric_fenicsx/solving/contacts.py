@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from mpi4py import MPI
+
 import numpy as np
 import numpy.typing as npt
 from ufl import as_vector, max_value
@@ -81,11 +83,11 @@ class Contacts:
         self._shifts: list[Any] = []
         self._samples: list[tuple[SampledTool, Any, Function]] = []
         self._memories: dict[str, Function] = {}
-        self._gaps: dict[str, Any] = {}
+        gaps = []
         self._layer = law.layer
         self._disc, self._histories = disc, histories
         tows = disc.tows
-        scalars, triples = (_dolfinx.lagrange(tows.mesh, size) for size in (1, 3))
+        triples = _dolfinx.lagrange(tows.mesh, 3)
 
         def number(value: Any) -> Any:
             return _dolfinx.constant(tows.mesh, value)
@@ -115,8 +117,7 @@ class Contacts:
             stiffened = (memory[1] - memory[0]) * memory[2] * tows.nodes
             self.terms.append(replace(energy_term(tool.name, tows, energy), loss=stiffened))
             gap = distance(tows.position)
-            form = beam.node_sums(tows, gap, scalars)
-            self._gaps[tool.name] = _dolfinx.compile_form(form, disc.comm)
+            gaps.append(gap)
             d = max_value(-gap, 0.0)
             after = (
                 contact.followed(d, memory[0], layer),
@@ -147,6 +148,10 @@ class Contacts:
                 )
                 histories.add_numbers(f"{tool.name}: height", self.pressed[tool.name].height_n)
 
+        together = gaps[0] if len(gaps) == 1 else as_vector(gaps)
+        form = beam.node_sums(tows, together, _dolfinx.lagrange(tows.mesh, len(gaps)))
+        self._gaps = _dolfinx.compile_form(form, disc.comm)
+
     def refresh(self) -> None:
         """Bring everything up to date that depends on the increment otherwise than by UFL."""
         self._sample()
@@ -170,11 +175,13 @@ class Contacts:
 
         Collective; (n_nodes,) each, on every rank.
         """
+        whole = self._disc.gather_nodes(self._own_gaps())
+        return dict(zip((tool.name for tool in self.tools), whole.T, strict=True))
+
+    def _own_gaps(self) -> Array:
+        """Distance of this rank's own nodes from each tool [mm], (n_owned, n_tools)."""
         disc = self._disc
-        return {
-            name: disc.gather_nodes(disc.node_values(form, 1)[: disc.owned])[:, 0]
-            for name, form in self._gaps.items()
-        }
+        return disc.node_values(self._gaps, len(self.tools))[: disc.owned]
 
     def firm_up(self) -> str:
         """Stiffen the contact where tows have sunk in too deep at the increment set last.
@@ -185,7 +192,9 @@ class Contacts:
             Into which tools and by how much, in words; empty where none did.
         """
         limit = contact.LIMIT * self._layer
-        deep = {name: -gap.min() for name, gap in self.gaps().items() if gap.min() < -limit}
+        least = self._own_gaps().min(axis=0, initial=np.inf)
+        self._disc.comm.Allreduce(MPI.IN_PLACE, least, op=MPI.MIN)
+        deep = {t.name: -gap for t, gap in zip(self.tools, least, strict=True) if gap < -limit}
         for name in deep:
             memory = self._memories[name].x
             memory.array[0::3] = self._histories.next(f"{name}: stiffness")[:, 0]
@@ -199,10 +208,10 @@ class Contacts:
         names = [tool.name for tool in self.tools]
         return np.array(self._places[names.index(name)].value)
 
-    def _sample(self) -> None:
-        """Sample the tools that are not analytic at the nodes' places, ghosts included."""
+    def _sample(self) -> bool:
+        """Sample the tools that are not analytic at the nodes' places; whether there are any."""
         if not self._samples:
-            return
+            return False
         disc, tows = self._disc, self._disc.tows
         moved = tows.u_n.x.array.reshape(-1, 3) + tows.w.x.array.reshape(-1, BLOCK)[:, :3]
         x = disc.net.points[disc.local_nodes] + moved
@@ -212,6 +221,7 @@ class Contacts:
             values = field.x.array.reshape(-1, 13)
             values[:, 0], values[:, 1:4], values[:, 4:10] = d, n, H[:, upper[0], upper[1]]
             values[:, 10:] = x
+        return True
 
     def set_time(self, start: float, end: float) -> None:
         """Move the tools to their places at the end of the step."""

@@ -24,6 +24,7 @@ from ..fabric.crossings import reference_angle
 from ..fabric.net import Net
 from ..mechanics.fields import ConnectorFields, TowFields
 from .blocks import BLOCK, block_matrix, expand
+from .partition import partition
 from .update import advance
 
 __all__ = ["BLOCK", "Discretisation"]
@@ -78,7 +79,9 @@ class Discretisation:
         whole = np.ones(len(net.crossings))
         self.interlacing = whole if interlacing is None else interlacing
         self.patch = whole if patch is None else patch
-        mesh = _dolfinx.interval_mesh(comm, net.points, net.cells)
+        self._numbers: dict[str, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = {}
+        owners = partition(net, comm.size) if comm.rank == 0 else None
+        mesh = _dolfinx.interval_mesh(comm, net.points, net.cells, owners)
         space = _dolfinx.lagrange(mesh, BLOCK)
         self._number(mesh, space)
 
@@ -220,7 +223,7 @@ class Discretisation:
     def cell_values(self, field: Any) -> Array:
         """Values of a field constant per cell at this rank's cells, (n_local_cells, size)."""
         dofs = _dolfinx.cell_dofs(field.function_space)[:, 0]
-        return field.x.array.reshape(len(dofs), -1)[dofs]
+        return field.x.array.reshape(-1, field.function_space.dofmap.index_map_bs)[dofs]
 
     def crossing_field(self, space: Any, values: Array) -> Function:
         """A connector field from values per crossing of the net, shape (n_crossings, size)."""
@@ -328,28 +331,50 @@ class Discretisation:
             PETSc.LGMap().create(connectors.astype(PETSc.IntType), bsize=BLOCK, comm=comm),
         )
 
-    def gather_nodes(self, local: Array) -> Array:
-        """Rows per owned block of every rank, in the order of the net's nodes, on every rank."""
-        size = local.shape[1]
-        parts = self.comm.allgather((self.local_nodes[: self.owned], local[: self.owned]))
-        whole = np.zeros((len(self.net.points), size))
-        for nodes, values in parts:
-            whole[nodes] = values
-        return whole
+    def gather_nodes(self, local: Array, *, to: int | None = None) -> Array:
+        """Rows per owned block of every rank, in the order of the net's nodes. Collective.
 
-    def gather_cells(self, local: Array) -> Array:
-        """Rows per owned cell of every rank, in the order of the net's cells, on every rank."""
-        whole = np.zeros((len(self.net.cells), local.shape[1]))
+        Args:
+            local: of this rank, (n_owned, size).
+            to: the rank that gets them; the others get nothing, (0, size). None: every rank.
+        """
+        return self._gather("nodes", self.local_nodes[: self.owned], local, to)
+
+    def gather_cells(self, local: Array, *, to: int | None = None) -> Array:
+        """Rows per owned cell of every rank, in the order of the net's cells. Collective.
+
+        Args:
+            local: of this rank, (n_owned_cells, size); rows of ghosts may follow.
+            to: see ``gather_nodes``.
+        """
         count = len(self.owned_cells)
-        for cells, values in self.comm.allgather((self.owned_cells, local[:count])):
-            whole[cells] = values
-        return whole
+        return self._gather("cells", self.owned_cells, local[:count], to)
 
-    def gather_crossings(self, local: Array) -> Array:
-        """Rows per crossing of every rank, in the order of the net's crossings, on every rank."""
-        whole = np.zeros((len(self.net.crossings), local.shape[1]))
-        for crossings, values in self.comm.allgather((self.local_crossings, local)):
-            whole[crossings] = values
+    def gather_crossings(self, local: Array, *, to: int | None = None) -> Array:
+        """Rows per crossing of every rank, in the order of the net's crossings. Collective.
+
+        Args:
+            local: of this rank, (n_local_crossings, size).
+            to: see ``gather_nodes``.
+        """
+        return self._gather("crossings", self.local_crossings, local, to)
+
+    def _gather(self, kind: str, own: Any, local: Array, to: int | None) -> Array:
+        comm = self.comm
+        if kind not in self._numbers:
+            # Which rows of the whole each rank has, told once.
+            parts = comm.allgather(own)
+            self._numbers[kind] = np.concatenate(parts), np.array([len(part) for part in parts])
+        numbers, counts = self._numbers[kind]
+        here = to is None or comm.rank == to
+        rows, whole = np.zeros((2, len(numbers) if here else 0, local.shape[1]))
+        sent = np.ascontiguousarray(local, dtype=np.float64)
+        if to is None:
+            comm.Allgatherv(sent, (rows, counts * local.shape[1]))
+        else:
+            comm.Gatherv(sent, (rows, counts * local.shape[1]) if here else None, root=to)
+        if here:
+            whole[numbers] = rows
         return whole
 
     def everywhere(self, update: Callable[[Any], None]) -> None:

@@ -100,19 +100,38 @@ class Histories:
         _dolfinx.add_vector(values, form)
         return values.reshape(-1, size)
 
-    def save(self) -> dict[str, Array]:
-        """The remembered values in the order of the net, on every rank. Collective."""
+    def save(self, *, to: int | None = None) -> dict[str, Array]:
+        """The remembered values in the order of the net. Collective.
+
+        Args:
+            to: the rank that gets them, those of the others being of no use. None: every rank.
+        """
         disc = self.disc
         saved = {name: values.copy() for name, values in self._numbers.items()}
-        for name, (where, field, _) in self._entries.items():
-            if where == "nodes":
-                saved[name] = disc.gather_nodes(field.x.array.reshape(-1, 3)[: disc.owned])
-            elif where == "cells":
-                saved[name] = disc.gather_cells(disc.cell_values(field))
-            else:
-                own = np.zeros((0, 1)) if field is None else disc.crossing_values(field)
-                saved[name] = disc.gather_crossings(own)
+        gather = {
+            "nodes": disc.gather_nodes,
+            "cells": disc.gather_cells,
+            "crossings": disc.gather_crossings,
+        }
+        # All of a kind in one message.
+        for where, gathered in gather.items():
+            names = [name for name, entry in self._entries.items() if entry[0] == where]
+            if names:
+                own = [self._own_values(name) for name in names]
+                whole = gathered(np.hstack(own), to=to)
+                ends = np.cumsum([values.shape[1] for values in own])[:-1]
+                saved |= dict(zip(names, np.hsplit(whole, ends), strict=True))
         return saved
+
+    def _own_values(self, name: str) -> Array:
+        """This rank's part of a remembered field, (n, size)."""
+        disc = self.disc
+        where, field, _ = self._entries[name]
+        if where == "nodes":
+            return field.x.array.reshape(-1, 3)[: disc.owned]
+        if where == "cells":
+            return disc.cell_values(field)
+        return np.zeros((0, 1)) if field is None else disc.crossing_values(field)
 
     def load(self, saved: dict[str, Array]) -> None:
         """Put saved values back; KeyError where one is missing."""

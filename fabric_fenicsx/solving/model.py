@@ -380,17 +380,18 @@ class Model:
         self.system.residual(F)
         return self.disc.gather_nodes(F.array_r.reshape(-1, BLOCK))
 
-    def external_work(self, outside: dict[str, Array]) -> Array:
+    def external_work(self, outside: dict[str, Array], reactions: Array) -> Array:
         """Virtual work of all that acts from outside, on w of this rank's nodes, (n_owned, 6).
 
         Weight, tools, supports and nodal loads [N, N mm].
+
+        Args:
+            outside: as of ``outside``.
+            reactions: of the supports, on the ``fixed`` rows, (n_fixed,) [N, N mm].
         """
-        own = self.disc.owned
-        F = self.disc.vector()
-        self.system.residual(F)
         work = self.system.load_work()
-        first = int(self.disc.global_blocks[0]) * BLOCK if own else 0
-        work.ravel()[self.fixed - first] += F.array_r[self.fixed - first]
+        first = int(self.disc.global_blocks[0]) * BLOCK if self.disc.owned else 0
+        work.ravel()[self.fixed - first] += reactions
         for part in outside.values():
             work += part
         return work

@@ -66,9 +66,14 @@ class Momentum:
         moment = rotate(q[:own], r - np.cross(theta, r) / 2.0 + along)
         return self._sum(f, np.cross(self._points + u[:own], f) + moment)
 
-    def external(self, outside: dict[str, Array]) -> Array:
-        """Force and moment of weight, tools, supports and nodal loads, (6,) [N, N mm]."""
-        return self.wrench(self.model.external_work(outside))
+    def external(self, outside: dict[str, Array], reactions: Array) -> Array:
+        """Force and moment of weight, tools, supports and nodal loads, (6,) [N, N mm].
+
+        Args:
+            outside: as of ``Model.outside``.
+            reactions: of the supports, as for ``Model.external_work``.
+        """
+        return self.wrench(self.model.external_work(outside, reactions))
 
     def _sum(self, first: Array, second: Array) -> Array:
         own = np.concatenate([first.sum(axis=0), second.sum(axis=0)])

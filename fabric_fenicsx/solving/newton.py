@@ -65,6 +65,10 @@ class Newton:
             what did not, in words.
         dyads: parts c rᵀ/s of the tangent beside the assembled matrix, to be taken off it; each
             gives (c, r, s), or None where it has nothing at this iterate.
+
+    Attributes:
+        reactions: what holds the prescribed rows at the increment evaluated last, (n_fixed,)
+            [N, N mm].
     """
 
     def __init__(
@@ -84,6 +88,7 @@ class Newton:
         self.iterations = 0
         self.factorisations = 0
         self.solve_seconds = 0.0
+        self.reactions = np.zeros(len(fixed))
         self._settle = settle
         self._dyads = list(dyads)
         self._prefix = prefix
@@ -149,7 +154,8 @@ class Newton:
             targets: prescribed increments of the fixed rows, shape (n_fixed,).
 
         Returns:
-            How it ended; the increment stands in ``x`` and in the system's fields.
+            How it ended; the increment stands in ``x`` and, as the last one that was evaluated, in
+            the system's fields.
         """
         self._target = targets
         self._history = []
@@ -167,9 +173,7 @@ class Newton:
         done = snes.getIterationNumber()
         self.iterations += done
         reason = snes.getConvergedReason()
-        if reason > 0:
-            self.system.set_increment(self.x)
-        elif reason == PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE:
+        if reason == PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE:
             # PETSc clears a factor's error after a zero pivot only; after any other one this solver
             # would fail for good.
             self._solvers.pop(self._symmetric).destroy()
@@ -186,6 +190,7 @@ class Newton:
     def residual(self, x: PETSc.Vec, F: PETSc.Vec, targets: npt.NDArray[np.float64]) -> None:
         """Residual at the increment x, which stands in the fields; prescribed rows miss theirs."""
         self.system.residual(F)
+        self.reactions = F.array_r[self._fixed]
         F.array[self._fixed] = x.array_r[self._fixed] - targets
 
     def factorised(self) -> Callable[[PETSc.Vec], PETSc.Vec]:

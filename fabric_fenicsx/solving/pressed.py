@@ -24,6 +24,7 @@ from ufl import as_vector, derivative, dot
 from .. import _dolfinx
 from ..errors import SolveError
 from ..mechanics.fields import TowFields
+from ..mechanics.terms import side_by_side
 from .discretisation import Discretisation
 from .tangent import Condensed, Whole, fail
 
@@ -40,7 +41,7 @@ LIMIT = 100
 
 
 class PressedTool:
-    """The height of one tool under a given force. Compiles four forms, two without friction.
+    """The height of one tool under a given force. Compiles three forms, two without friction.
 
     Args:
         disc: the discretised net.
@@ -49,7 +50,8 @@ class PressedTool:
         traction: friction per tow length (UFL), None where there is none.
         place: constant of the forms, the tool's place; its height is changed here.
         shift: constant of the forms, the tool's move over the step.
-        moved: called when the height has changed, before forces are evaluated.
+        moved: called when the height has changed, before forces are evaluated; says whether it has
+            changed a field.
         reach: by how much the tool is lowered at first when it touches nothing [mm].
     """
 
@@ -62,7 +64,7 @@ class PressedTool:
         *,
         place: Any,
         shift: Any,
-        moved: Callable[[], None],
+        moved: Callable[[], bool],
         reach: float,
     ) -> None:
         self._disc, self._force = disc, force
@@ -71,8 +73,9 @@ class PressedTool:
         up = as_vector((0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
         residual, lift = _work(tows, energy, traction, tows.test), _work(tows, energy, traction, up)
         row = derivative(lift, tows.w, tows.test)
-        self._lift = _dolfinx.compile_form(lift, comm)
-        self._stiffness = _dolfinx.compile_form(derivative(lift, tows.w, up), comm)
+        self._pairs = _dolfinx.constants_per_cell(tows.mesh, 2)
+        state = side_by_side([lift, derivative(lift, tows.w, up)], self._pairs)
+        self._lift = _dolfinx.compile_form(state, comm)
         self._row = self._column = _dolfinx.compile_form(row, comm)
         if traction is not None:
             self._column = _dolfinx.compile_form(derivative(residual, tows.w, up), comm)
@@ -97,11 +100,12 @@ class PressedTool:
         """
         if self.target <= 0.0:
             return
+        packed = _dolfinx.pack(self._lift)
         low, high = -np.inf, np.inf
         reach = self._reach
         z = float(self._place.value[2])
         for _ in range(LIMIT):
-            lift, stiffness = self._state()
+            lift, stiffness = self._state(packed)
             missing = self.target - lift
             if abs(missing) <= TOLERANCE * self.target:
                 return
@@ -118,7 +122,8 @@ class PressedTool:
             if guess in (low, high):
                 return
             z = guess
-            self._move(z)
+            if self._move(z):
+                packed = _dolfinx.pack(self._lift)
         raise SolveError(f"no height of the pushed tool gives {self.target:.6g} N")
 
     def dyad(self) -> Dyad | None:
@@ -129,16 +134,18 @@ class PressedTool:
         column = self._vector(self._column) if self._column is not self._row else row.copy()
         return column, row, self._state()[1]
 
-    def _state(self) -> tuple[float, float]:
-        own = np.array([_dolfinx.cell_scalar(self._lift), _dolfinx.cell_scalar(self._stiffness)])
+    def _state(self, packed: list[Any] | None = None) -> tuple[float, float]:
+        """By how much the fabric lifts the tool, and s."""
+        own = _dolfinx.cell_sums(self._lift, self._pairs, packed)
         total = np.zeros(2)
         self._disc.comm.Allreduce(own, total, op=MPI.SUM)
         return float(total[0]), float(total[1])
 
-    def _move(self, z: float) -> None:
+    def _move(self, z: float) -> bool:
+        """Put the tool at a height; whether fields of the forms have changed by that."""
         self._shift.value[2] = z - self.height_n[0]
         self._place.value[2] = z
-        self._moved()
+        return self._moved()
 
     def _vector(self, form: Any) -> PETSc.Vec:
         local = np.zeros(len(self._disc.rows))
@@ -167,20 +174,28 @@ class DyadicLU:
 
     def __init__(self, tangent: Whole | Condensed, dyads: Callable[[], list[Dyad]]) -> None:
         self._tangent, self._dyads = tangent, dyads
+        self._new: list[Dyad] = []
         self._solved: list[Dyad] = []
 
     def setUp(self, pc: PETSc.PC) -> None:
-        """Factorise, and solve for every dyad's column."""
+        """Factorise."""
         self._tangent.factorise()
-        self._solved = []
-        for column, row, s in self._dyads():
-            p = column.duplicate()
-            self.apply(pc, column, p)
-            self._solved.append((p, row, s - row.dot(p)))
+        self._new, self._solved = self._dyads(), []
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Y = (A − Σ dyads)⁻¹ b."""
-        if not self._tangent.solve(b, y):
+        """Y = (A − Σ dyads)⁻¹ b; the first time with every dyad's column beside b."""
+        columns = [column for column, _, _ in self._new]
+        found = [column.duplicate() for column in columns]
+        if not self._tangent.solve([b, *columns], [y, *found]):
             fail(pc)
+            return
+        for p, (_, row, s) in zip(found, self._new, strict=True):
+            self._take_off(p)
+            self._solved.append((p, row, s - row.dot(p)))
+        self._new = []
+        self._take_off(y)
+
+    def _take_off(self, y: PETSc.Vec) -> None:
+        """What the dyads solved so far do to a solution."""
         for p, row, rest in self._solved:
             y.axpy(row.dot(y) / rest, p)

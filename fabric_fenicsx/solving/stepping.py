@@ -88,6 +88,7 @@ class Step:
         length: Δt [s].
         iterations: of Newton.
         failures: attempts with longer steps that failed before it.
+        reactions: what the supports exert on the prescribed rows at its end, (n_fixed,) [N, N mm].
     """
 
     number: int
@@ -95,6 +96,7 @@ class Step:
     length: float
     iterations: int
     failures: int
+    reactions: Array
 
 
 class Stepper:
@@ -147,7 +149,9 @@ class Stepper:
             if outcome.converged and move <= control.largest_move:
                 self.number += 1
                 now = self.state.time + length
-                step = Step(self.number, now, length, outcome.iterations, failures)
+                step = Step(
+                    self.number, now, length, outcome.iterations, failures, self.newton.reactions
+                )
                 h = control.after(length, h, outcome.iterations)
                 self.observe(step)
                 self.advance(length)

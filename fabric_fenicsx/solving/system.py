@@ -15,7 +15,7 @@ import numpy.typing as npt
 from .. import _dolfinx
 from .._dolfinx import Function
 from ..mechanics.beam import SectionLaw, linear_section, linearised_forces
-from ..mechanics.terms import Term
+from ..mechanics.terms import Term, side_by_side
 from .discretisation import BLOCK, Discretisation
 
 __all__ = ["System"]
@@ -57,7 +57,8 @@ class System:
             raise ValueError(
                 f"{next(n for n in names if names.count(n) > 1)}: a term that is twice"
             )
-        self._forms: dict[tuple[str, str], Any] = {}
+        self._forms: dict[str, Any] = {}
+        self._shares: dict[tuple[str, str], tuple[list[str], Any, Any]] = {}
         # One kernel call and one insertion per cell for all terms of a mesh.
         self._residuals = {mesh: self._sum("residual", mesh) for mesh in MESHES}
         self._tangents = {mesh: self._sum("tangent", mesh) for mesh in MESHES}
@@ -96,13 +97,6 @@ class System:
         if not any(comm.allgather(form is not None)):
             return None
         return _dolfinx.compile_form(form, comm, here=form is not None)
-
-    def _part(self, part: str, term: Term) -> Any:
-        """One part of one term, compiled when it is first asked for. Collective."""
-        key = (part, term.name)
-        if key not in self._forms:
-            self._forms[key] = self._compile(getattr(term, part))
-        return self._forms[key]
 
     @property
     def symmetric(self) -> bool:
@@ -221,21 +215,46 @@ class System:
         return self._summed("loss")
 
     def _summed(self, part: str) -> dict[str, float]:
-        comm = self.net.comm
-        # A rank without crossings has no forms of them.
-        having = comm.allgather([t.name for t in self.terms if getattr(t, part) is not None])
-        names = max(having, key=len)
-        forms = [self._part(part, self._by_name[name]) for name in names]
-        own = np.array([0.0 if form is None else _dolfinx.cell_scalar(form) for form in forms])
-        total = np.zeros_like(own)
-        comm.Allreduce(own, total)
+        own: dict[str, float] = {}
+        for mesh in MESHES:
+            names, space, form = self._together(part, mesh)
+            sums = np.zeros(len(names)) if form is None else _dolfinx.cell_sums(form, space)
+            own |= dict(zip(names, sums, strict=True))
+        names = [term.name for term in self.terms if term.name in own]
+        total = np.zeros(len(names))
+        self.net.comm.Allreduce(np.array([own[name] for name in names]), total)
         return dict(zip(names, total.tolist(), strict=True))
+
+    def _together(self, part: str, mesh: str) -> tuple[list[str], Any, Any]:
+        """Names of the terms on a mesh that have a part, and these parts side by side. Collective.
+
+        A rank without crossings has names only.
+        """
+        key = (part, mesh)
+        if key not in self._shares:
+            comm = self.net.comm
+            here = {
+                term.name: getattr(term, part)
+                for term in self.terms
+                if term.where == mesh and getattr(term, part) is not None
+            }
+            names = max(comm.allgather(list(here)), key=len)
+            space = form = None
+            if here:
+                fields = self.net.tows if mesh == "tows" else self.net.connectors
+                assert fields is not None
+                space = _dolfinx.constants_per_cell(fields.mesh, len(here))
+                form = side_by_side(list(here.values()), space)
+            self._shares[key] = names, space, self._compile(form)
+        return self._shares[key]
 
     def term_forces(self, name: str) -> Array:
         """Nodal forces of one tow term (the negative is what it exerts), (n_owned, 6) [N, N mm]."""
         net = self.net
         local = np.zeros(len(net.rows))
-        _dolfinx.add_vector(local, self._part("residual", self._by_name[name]))
+        if name not in self._forms:
+            self._forms[name] = self._compile(self._by_name[name].residual)
+        _dolfinx.add_vector(local, self._forms[name])
         return net.summed(local).array_r.copy().reshape(-1, BLOCK)
 
     def section_forces(self) -> Array:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import logging
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,8 @@ from .ordering import nested_dissection
 from .system import System
 
 __all__ = ["Condensed", "Whole", "fail", "tangent_of"]
+
+Array = npt.NDArray[np.float64]
 
 #: Nodes between crossings from which on eliminating them pays.
 LEAST = 100
@@ -103,15 +106,17 @@ class Whole:
         self._solver.setOperators(self.matrix)
         self._solver.setUp()
 
-    def solve(self, b: PETSc.Vec, y: PETSc.Vec) -> bool:
-        """Solve for y by the last factorisation; whether it served. Collective."""
-        self._solver.solve(b, y)
-        if self._solver.getConvergedReason() > 0:
-            return True
-        # PETSc does not get over every error of a factor.
-        self._solver.destroy()
-        self._solver = self._new_solver()
-        return False
+    def solve(self, rights: Sequence[PETSc.Vec], solutions: Sequence[PETSc.Vec]) -> bool:
+        """Solve by the last factorisation, together; whether it served. Collective."""
+        found = _solved(self._solver, [b.array_r for b in rights])
+        if found is None:
+            # PETSc does not get over every error of a factor.
+            self._solver.destroy()
+            self._solver = self._new_solver()
+            return False
+        for y, values in zip(solutions, found, strict=True):
+            y.array[:] = values
+        return True
 
 
 class Condensed:
@@ -174,8 +179,7 @@ class Condensed:
             symmetric=self._symmetric,
             kind=PETSc.Mat.Type.AIJ if self._dissected else PETSc.Mat.Type.BAIJ,
         )
-        self._z, self._b = self._R.createVecs()
-        self._scale = self._b.duplicate()
+        self._scale = self._R.createVecLeft()
         self._solver = self._new_solver()
         self.unknowns = len(left) * BLOCK
 
@@ -241,23 +245,23 @@ class Condensed:
         self._solver.setOperators(R)
         self._solver.setUp()
 
-    def solve(self, b: PETSc.Vec, y: PETSc.Vec) -> bool:
-        """Solve for y by the last factorisation; whether it served. Collective."""
-        g = b.array_r.copy()
-        nodes = g.reshape(-1, BLOCK)
-        self._elimination.forward(g)
-        self._b.array[:] = nodes[self._kept].ravel()
-        self._b.pointwiseMult(self._b, self._scale)
-        self._solver.solve(self._b, self._z)
-        self._z.pointwiseMult(self._z, self._scale)
-        nodes[self._kept] = self._z.array_r.reshape(-1, BLOCK)
-        self._elimination.backward(g)
-        y.array[:] = g
-        if self._solver.getConvergedReason() > 0:
-            return True
-        self._solver.destroy()
-        self._solver = self._new_solver()
-        return False
+    def solve(self, rights: Sequence[PETSc.Vec], solutions: Sequence[PETSc.Vec]) -> bool:
+        """Solve by the last factorisation, together; whether it served. Collective."""
+        scale = self._scale.array_r
+        reduced = [b.array_r.copy() for b in rights]
+        for g in reduced:
+            self._elimination.forward(g)
+        left = [g.reshape(-1, BLOCK)[self._kept].ravel() * scale for g in reduced]
+        found = _solved(self._solver, left)
+        if found is None:
+            self._solver.destroy()
+            self._solver = self._new_solver()
+            return False
+        for y, g, z in zip(solutions, reduced, found, strict=True):
+            g.reshape(-1, BLOCK)[self._kept] = (z * scale).reshape(-1, BLOCK)
+            self._elimination.backward(g)
+            y.array[:] = g
+        return True
 
 
 def _solver(comm: MPI.Comm, prefix: str, symmetric: bool, **more: Any) -> PETSc.KSP:
@@ -279,9 +283,45 @@ def _solver(comm: MPI.Comm, prefix: str, symmetric: bool, **more: Any) -> PETSc.
     return solver
 
 
+def _solved(solver: PETSc.KSP, rights: Sequence[Array]) -> list[Array] | None:
+    """Solutions for right-hand sides on this rank's rows; None where the factorisation failed.
+
+    By a direct solver several at once take hardly longer than one. Collective.
+    """
+    # That of the factorisation; one that succeeded has none or the last solution's.
+    if solver.getConvergedReason() < 0:
+        return None
+    pc = solver.getPC()
+    direct = solver.getType() == "preonly" and pc.getType() in ("lu", "cholesky")
+    found = []
+    if direct and len(rights) > 1:
+        rows = solver.getOperators()[0].getSizes()[0]
+        columns = (PETSc.DECIDE, len(rights))
+        B = PETSc.Mat().createDense((rows, columns), comm=solver.getComm())
+        B.setUp()
+        B.getDenseArray()[:] = np.column_stack(rights)
+        B.assemble()
+        X = B.duplicate()
+        pc.getFactorMatrix().matSolve(B, X)
+        found = list(X.getDenseArray().T.copy())
+        B.destroy()
+        X.destroy()
+        return found
+    b, x = solver.getOperators()[0].createVecs()
+    for right in rights:
+        b.array[:] = right
+        solver.solve(b, x)
+        if solver.getConvergedReason() < 0:
+            return None
+        found.append(x.array_r.copy())
+    b.destroy()
+    x.destroy()
+    return found
+
+
 def _ordering(comm: MPI.Comm) -> dict[str, int]:
-    """MUMPS' ordering found best on these nets: METIS (PORD without it), on several ranks AMF."""
-    return {"mat_mumps_icntl_7": 5 if comm.size == 1 else 2}
+    """MUMPS' ordering found best on these nets: METIS (PORD without it), on several ranks PORD."""
+    return {"mat_mumps_icntl_7": 5 if comm.size == 1 else 4}
 
 
 def _owners(disc: Discretisation) -> npt.NDArray[np.int64]:
