@@ -121,7 +121,8 @@ def synthesise(
     for option in of_kind:
         having = [other.name for other in KINDS if option in other.options]
         if kind.name not in having:
-            raise InputError(f"--{option}: allowed with test: {one_of(having)} only")
+            name = option.replace("_", "-")
+            raise InputError(f"--{name}: allowed with test: {one_of(having)} only")
     made = kind.made_up(case, place, noise, readings, seed, of_test(own, case.test), **of_kind)
     experiment, measurement = made.experiment, made.measurement
     forms: list[Variant] = []

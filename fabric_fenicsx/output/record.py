@@ -82,7 +82,9 @@ class Record:
         self.folder, self.model = folder, model
         self.recent: deque[dict[str, float]] = deque(maxlen=RECENT)
         self.gaps: dict[str, npt.NDArray[np.float64]] = {}
-        self.steps, self._table = folder / "steps", folder / "steps.csv"
+        # Rank 0's, whatever folder a script has named on the others.
+        self.steps = model.comm.bcast((folder / "steps").absolute())
+        self._table = folder / "steps.csv"
         self._root, self._keeper = model.comm.rank == 0, neighbour(model.comm)
         self._columns: list[str] = []
         self._seen: dict[str, npt.NDArray[np.float64]] = {}

@@ -106,6 +106,7 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
 def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -> None:
     """Two pictures, each by a rank of its own where two can write."""
     comm = session.comm
+    folder = comm.bcast(session.folder.absolute())
     writers = sorted({0, neighbour(comm)})
     if comm.rank not in writers:
         return
@@ -125,7 +126,7 @@ def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -
     )
     for view, shown in views[writers.index(comm.rank) :: len(writers)]:
         draw_net(
-            session.folder / f"drape_{view}.png",
+            folder / f"drape_{view}.png",
             net,
             snapshot,
             surfaces=shown,
