@@ -382,7 +382,8 @@ def test_a_drape_that_no_measurement_can_tell_is_not_made_up():
     oiled = DrapeCase(test="drape", contact={"friction": 0.1})
     with pytest.raises(InputError, match=r"contact: .* put effects in as --effect"):
         synthesise(oiled, [], 1.0, solve=made_up)
-    with pytest.raises(InputError, match="--rates: allowed with test: picture_frame or bias_ext"):
+    message = "--rates: allowed with test: picture_frame or bias_extension only"
+    with pytest.raises(InputError, match=message):
         synthesise(DrapeCase(test="drape"), [], 1.0, rates=[1.0], solve=made_up)
 
 
