@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from linear import covariance, drawn, readings
+from linear import Linear, covariance, drawn, readings
 
+from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.noise import Noise, estimated_noise, whiteness
+from fabric_fenicsx.loop.inference.variances import Variances
 
 NOISE = Noise(floor=0.3, share=0.2, correlation=0.7)
 
@@ -77,3 +80,34 @@ def test_differences_of_neighbours_do_not_see_a_smooth_misfit():
     found = estimated_noise(0.1 * rng.normal(size=2000) + 50.0 * np.sin(5.0 * t), data, every)
     # By the median, whose standard error is 1.17/√n of it.
     assert found == pytest.approx(0.1, rel=0.1)
+
+
+def judged(observed, x):
+    """Readings that are left out of a line through nothing, its noise as the line leaves it."""
+    experiment = Linear(readings(observed), {"slope": x}, ["slope"])
+    judge = Judge(experiment, [])
+    rows = np.ones(len(x), dtype=bool)
+    line = fit(experiment, (), {"slope": 0.0}, rows, Variances(Noise(0.15)))
+    line = fit(experiment, (), line.values, rows, judge.components(line).variances)
+    judge.leave_out(line)
+    return np.flatnonzero(judge.outliers).tolist(), line.variances.noise.share
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_last_reading_of_a_line_is_not_what_its_noise_is_known_from(seed):
+    x = np.linspace(0.0, 100.0, 40)
+    observed = x + 0.15 * np.random.default_rng(seed).normal(size=40)
+    observed[-1] += 1.6
+    out, share = judged(observed, x)
+    # Beside it noise seems to grow with the reading.
+    assert share > 1e-3
+    assert out == [39]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_that_grows_with_the_reading_leaves_none_out(seed):
+    x = np.linspace(1.0, 100.0, 70)
+    noise = np.hypot(0.15, 0.02 * x) * np.random.default_rng(seed).normal(size=70)
+    out, share = judged(x + noise, x)
+    assert share > 1e-2
+    assert not out

@@ -22,9 +22,16 @@ from .criteria import CRITERIA
 from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitting import Fit, linearised
-from .noise import Whiteness, missed_readings, outliers, whiteness
+from .noise import Noise, Whiteness, missed_readings, outliers, whiteness
 from .validation import CrossValidation, cross_validated, fitted_without, parts_by, stretches
-from .variances import Estimate, Variances, averaged, chance_of_no_misfit, estimate
+from .variances import (
+    Estimate,
+    Linearised,
+    Variances,
+    averaged,
+    chance_of_no_misfit,
+    estimate,
+)
 
 __all__ = ["Judge", "Laboratory", "Misfit", "Model"]
 
@@ -120,23 +127,41 @@ class Judge:
 
     def leave_out(self, model: Fit) -> bool:
         """Leave out readings that stand out from a model; whether others are fitted than before."""
-        z = model.residual / model.variances.noise.sigma(self._readings)
+        noise = model.variances.noise
+        # One at the end of a line may look like noise that grows with the reading: what the others
+        # scatter by decides.
+        suspected = self._standing_out(model, Noise(noise.floor)) & model.used
+        if noise.share > 0.0 and (suspected & ~self._standing_out(model, noise)).any():
+            others = linearised(self._experiment, model).without(suspected)
+            noise = self._estimated(others, model.variances).variances.noise
+        found = self._standing_out(model, noise)
+        changed = bool((found != self.outliers)[self._readings.fit].any())
+        self.outliers = found
+        return changed
+
+    def _standing_out(self, model: Fit, noise: Noise) -> Flags:
+        """Readings that stand out from a model, if they scatter so, (n,)."""
+        z = model.residual / noise.sigma(self._readings)
         readings = self._readings
         found = outliers(z, readings, readings.usable)
         # What is held out has no say in what the others are judged by.
         for rows in (readings.fit, readings.holdout & readings.usable):
             found |= missed_readings(z, readings, rows & ~found)
-        changed = bool((found != self.outliers)[readings.fit].any())
-        self.outliers = found
-        return changed
+        return found
 
     # Comparison ---------------------------------------------------------------------------
 
     def components(self, model: Fit, *, smooth: bool = False, compared: bool = False) -> Estimate:
         """Variance components of a fitted model; see estimate."""
+        at = linearised(self._experiment, model)
+        return self._estimated(at, model.variances, smooth=smooth, compared=compared)
+
+    def _estimated(
+        self, at: Linearised, start: Variances, *, smooth: bool = False, compared: bool = False
+    ) -> Estimate:
         return estimate(
-            linearised(self._experiment, model),
-            model.variances,
+            at,
+            start,
             given=self.given,
             smooth=smooth,
             compared=compared,

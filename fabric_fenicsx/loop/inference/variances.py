@@ -85,6 +85,13 @@ class Linearised:
     readings: Readings
     rows: Flags
 
+    def without(self, others: Flags) -> Linearised:
+        """The same with some readings left out, flags over all readings."""
+        kept = ~others[self.rows]
+        specimens = {group: block[kept] for group, block in self.specimens.items()}
+        rows = self.rows & ~others
+        return Linearised(self.residual[kept], self.common[kept], specimens, self.readings, rows)
+
 
 @dataclass(frozen=True, slots=True)
 class Estimate:

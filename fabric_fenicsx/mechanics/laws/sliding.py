@@ -24,6 +24,9 @@ ROUNDING = Parameter(
 )
 # Friction has its moment at the usual rates of a test: what saturates among them is a dashpot.
 SHARP = replace(ROUNDING, upper=0.2, starts=(5e-3, 0.05), share_of="typical_rate")
+#: Of two roundings, the second so many times the first: it is to be sharp as well.
+SECOND = 6.0
+BOTH_SHARP = replace(SHARP, upper=0.2 / SECOND, starts=(1e-3, 0.01))
 SLOW = Parameter(
     "saturation_rad_s",
     (0.2, 1.5),
@@ -64,8 +67,8 @@ class SlidingFriction(CrossingLaw):
             "crossover_friction",
             "sliding, rounded twice",
             tuple(
-                {"limit": replace(LIMIT, name=f"m_c{k}_N"), "rounding": Times(r, SHARP)}
-                for k, r in ((1, 1.0), (2, 6.0))
+                {"limit": replace(LIMIT, name=f"m_c{k}_N"), "rounding": Times(r, BOTH_SHARP)}
+                for k, r in ((1, 1.0), (2, SECOND))
             ),
             rank=6,
         ),
@@ -77,7 +80,7 @@ class SlidingFriction(CrossingLaw):
                     "limit": replace(VISCOUS, name=f"m_v{k}_N"),
                     "rounding": Times(r, SLOW),
                 }
-                for k, r in ((1, 1.0), (2, 6.0))
+                for k, r in ((1, 1.0), (2, SECOND))
             ),
             rank=4,
         ),
