@@ -1,13 +1,13 @@
-"""A strip pulled out once by the finite elements: what its crossings did on the way.
+"""A strip pulled by the finite elements, out and where it is wanted back: what its crossings did.
 
 A law of the crossings without memory is known by its curve m(γ); any other goes through one such
-curve on the way out. The strip is solved with that curve, as a table, so that nothing is compiled
-for another law.
+curve on the way out and through another on the way back. The strip is solved with these curves, as
+tables, so that nothing is compiled for another law.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from pathlib import Path
@@ -21,20 +21,23 @@ import numpy.typing as npt
 from scipy.interpolate import PPoly
 
 from ...._dolfinx import Function
-from ....errors import InputError
+from ....errors import InputError, SolveError
 from ....mechanics.laws.law import Crossing
 from ....mechanics.laws.tabulated import TabulatedSpring
 from ....rigs.bias_extension import BiasExtensionCase, build, clamps, middle_zone, slip_limit
 from ....rigs.cases import SolverKeys
 from ....rigs.common import Session, control
-from ....rigs.crosshead import duration
+from ....rigs.crosshead import crosshead, duration
+from ....solving.model import Model
+from ....solving.snapshot import Snapshot
 from ....solving.stepping import Step, Stepper
 from ...measurement.case import measured_case, tow_of
 from ...measurement.schema import FILE, Measurement, Run
 
-__all__ = ["KNOTS", "Curve", "StripPath", "solved_strip", "strip_case"]
+__all__ = ["KNOTS", "Curve", "StripPath", "pulled", "solved_strip", "strip_case"]
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 #: Angles [degrees] at which a curve is given; the last piece goes on straight.
 KNOTS = np.array([0.0, 3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 38.0, 44.0, 50.0, 56.0, 62.0, 70.0])
@@ -56,20 +59,35 @@ class Curve:
 
     Attributes:
         moments: at the knots, not falling, 0 at first.
+        back: the curve on the way back; None: the same.
     """
 
     moments: tuple[float, ...]
+    back: Curve | None = None
 
     @classmethod
-    def through(cls, moments: Array) -> Curve:
-        """The nearest that does not fall."""
+    def through(cls, moments: Array, back: Array | None = None) -> Curve:
+        """The nearest that does not fall, and on the way back.
+
+        Raises:
+            SolveError: a moment is not a number.
+        """
+        if not np.isfinite(moments).all():
+            raise SolveError("the moment of the crossings is not a number")
         rising = np.maximum.accumulate(np.maximum(moments, 0.0))
         least = LEAST_SLOPE * max(float(rising[-1]), NOTHING) * np.radians(KNOTS)
-        return cls((0.0, *(rising + least)[1:].tolist()))
+        return cls(
+            (0.0, *(rising + least)[1:].tolist()), None if back is None else cls.through(back)
+        )
 
     def __call__(self, gamma: Array) -> Array:
         """At shear angles [rad]."""
         return np.asarray(np.sign(gamma) * _cubics(self)(np.abs(gamma)))
+
+    def at(self, gamma: Array, back: Flags) -> Array:
+        """At shear angles [rad] on either way; flags as many, or one for several angles."""
+        out = self(gamma)
+        return out if self.back is None else np.where(back, self.back(gamma), out)
 
     @property
     def idle(self) -> bool:
@@ -92,14 +110,15 @@ def _cubics(curve: Curve) -> PPoly:
 
 @dataclass(frozen=True, slots=True)
 class StripPath:
-    """A strip on its way out.
+    """A strip on its way out, or back.
 
     Attributes:
-        travel: D [mm], increasing from 0, (n,).
+        travel: D [mm], increasing, (n,); out from 0.
         force: of the crosshead [N], (n,).
         gamma: shear angles that the crossings feel [rad], (n, n_crossings).
         middle: mean angle between the tows' axes in the middle zone [rad], (n,).
         area: of fabric that each crossing stands for [mm²], (n_crossings,).
+        back: its way back from there; None where it was not solved.
     """
 
     travel: Array
@@ -107,6 +126,7 @@ class StripPath:
     gamma: Array
     middle: Array
     area: Array
+    back: StripPath | None = None
 
 
 def strip_case(
@@ -116,6 +136,7 @@ def strip_case(
     rate: float,
     changes: Mapping[str, Any],
     steps: int = STEPS,
+    back: bool = False,
 ) -> BiasExtensionCase:
     """The case of a run's way out, its crossings without a moment of their own.
 
@@ -126,6 +147,7 @@ def strip_case(
         rate: of the crosshead [mm/s].
         changes: other keys, by their dotted names.
         steps: of the way, if none fails.
+        back: whether it is let back to where it began.
 
     Raises:
         InputError: there can be no such strip.
@@ -145,7 +167,7 @@ def strip_case(
         "travel_mm": travel,
         "rate_mm_min": 60.0 * rate,
         "hold_s": 0.0,
-        "unload": False,
+        "unload": back,
         "tow": tow,
         "crossover": {"k1_N_mm": 0.0, "k3_N_mm": 0.0, "dashpot_N_s_mm": 0.0},
         "solver": {
@@ -158,12 +180,53 @@ def strip_case(
     return measured_case(BiasExtensionCase, keys, changes, place)
 
 
+def pulled(
+    model: Model,
+    case: BiasExtensionCase,
+    corners: Iterable[float],
+    seen: Callable[[Snapshot], None] = lambda snapshot: None,
+) -> tuple[Array, Array, Array]:
+    """Pull a strip from its rest on.
+
+    Args:
+        model: of the strip.
+        case: of it.
+        corners: times at which its motion changes, the end at last [s]; each is asked for when the
+            one before it has been reached.
+        seen: given each step's snapshot.
+
+    Returns:
+        Times [s], forces of the crosshead [N] and mean angles between the tows' axes in the middle
+        zone [rad], at rest and at each step, (n,) each.
+
+    Raises:
+        SolveError: it stopped before its end.
+    """
+    upper, middle = clamps(model.net, case)[1], middle_zone(model.net, case)[0]
+    rows = [(0.0, 0.0, 0.0)]
+
+    def observe(step: Step) -> None:
+        snapshot = model.snapshot(step.time)
+        seen(snapshot)
+        force = float(model.reactions()[upper, 1].sum())
+        rows.append((step.time, force, float(snapshot.shear_angle[middle].mean())))
+
+    keys = case.solver
+    newton = model.newton(force_tolerance=keys.force_tolerance_N, limit=keys.iteration_limit)
+    stepper = Stepper(model, newton, control(keys), observe=observe)
+    for corner in corners:
+        stepper.run(corner)
+        stepper.predictor.forget()
+    time, force, angle = np.array(rows).T
+    return time, force, angle
+
+
 def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:
-    """Pull a strip on this rank alone.
+    """Pull a strip on this rank alone, and let it back where the case says so.
 
     Raises:
         InputError: there is no such strip.
-        SolveError: it stopped before its end.
+        SolveError: it stopped on its way out.
     """
     crossover, tow = case.crossover, case.tow
     # What its forms do not depend on.
@@ -176,7 +239,14 @@ def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:
     }
     strip = _strip(case.model_copy(update=built).model_dump_json())
     strip.put_at_rest(case, curve)
-    return strip.pulled(case)
+    try:
+        return strip.pulled(case, curve)
+    except SolveError:
+        if not case.unload:
+            raise
+    # The way out may be had without the way back.
+    strip.put_at_rest(case, curve)
+    return strip.pulled(case.model_copy(update={"unload": False}), curve)
 
 
 @dataclass(frozen=True)
@@ -246,40 +316,40 @@ class _Strip:
         for f, values in self._rest:
             f.x.array[:] = values
         model.histories.load(self._memories)
-        for table in self._tables:
-            table.exchange(curve.law(self._area))
+        self._take(curve)
         crossings = model.crossings
         if crossings is not None and crossings.slip_limit is not None:
             crossings.slip_limit.value = slip_limit(case)
         if model.crimp_strain is not None:
             model.crimp_strain.value = case.tow.crimp_strain
 
-    def pulled(self, case: BiasExtensionCase) -> StripPath:
-        """Pull it."""
+    def _take(self, curve: Curve) -> None:
+        for table in self._tables:
+            table.exchange(curve.law(self._area))
+
+    def pulled(self, case: BiasExtensionCase, curve: Curve) -> StripPath:
+        """Pull it, and let it back with the curve of that way."""
         model = self._model
-        net = model.net
-        places, spacings = net.points[net.crossings[:, 0]], case.spacings
-        upper = clamps(net, case)[1]
-        middle = middle_zone(net, case)[0]
-        travels, forces, means, angles = [0.0], [0.0], [0.0], [np.zeros(len(places))]
+        places, spacings = model.net.points[model.net.crossings[:, 0]], case.spacings
+        area = case.strip.shares(places, spacings) * spacings[0] * spacings[1]
+        # What the springs feel is the directors' turn, what a camera sees the axes' angle.
+        angles = [np.zeros(len(places))]
+        out, end = 60.0 * case.travel_mm / case.rate_mm_min, duration(case)
 
-        def observe(step: Step) -> None:
-            travels.append(case.rate_mm_min / 60.0 * step.time)
-            forces.append(float(model.reactions()[upper, 1].sum()))
-            snapshot = model.snapshot(step.time)
-            # What the springs feel is the directors' turn, what a camera sees the axes' angle.
-            angles.append(snapshot.director_turn)
-            means.append(float(snapshot.shear_angle[middle].mean()))
+        def corners() -> Iterator[float]:
+            yield out
+            if case.unload:
+                self._take(curve.back or curve)
+                yield end
 
-        solver = case.solver
-        newton = model.newton(
-            force_tolerance=solver.force_tolerance_N, limit=solver.iteration_limit
+        time, force, middle = pulled(
+            model, case, corners(), lambda snapshot: angles.append(snapshot.director_turn)
         )
-        Stepper(model, newton, control(solver), observe=observe).run(duration(case))
-        return StripPath(
-            np.array(travels),
-            np.array(forces),
-            np.array(angles),
-            np.array(means),
-            case.strip.shares(places, spacings) * spacings[0] * spacings[1],
-        )
+        travel = np.array([crosshead(case, t) for t in time])
+        gamma, turn = np.array(angles), int(np.argmin(np.abs(time - out))) + 1
+
+        def path(rows: slice, back: StripPath | None = None) -> StripPath:
+            return StripPath(travel[rows], force[rows], gamma[rows], middle[rows], area, back)
+
+        # Of the turn itself the way back has no force: the moments have just changed.
+        return path(slice(turn), path(slice(None, turn - 1, -1)) if case.unload else None)
