@@ -52,6 +52,8 @@ Flags = npt.NDArray[np.bool_]
 PACE = 1.5
 #: Points of the way on which a law with memory is followed to its curve.
 ALONG = 60
+#: Parameter of the baseline's dashpot.
+DASHPOT = "c1_N_s"
 #: Share of its travel that a strip must have been let back by: less is the noise of a record.
 GONE_BACK = 0.02
 #: Share by which a curve, a slip or a crimp may differ from those that a fit was solved with.
@@ -305,9 +307,15 @@ class BiasExtension(CrossheadTest):
         moments: Array,
         size: float = 1.0,
     ) -> Curve:
-        """The curves of a model with some moments at KNOTS on its way out, over a size."""
-        back = self._at_knots_back(variants, values) / size if self._back.any() else None
-        return Curve.through(moments / size, back)
+        """The curves of a model with some moments at KNOTS on its way out, over a size.
+
+        Of all but the baseline's dashpot, which strips are solved with as such.
+        """
+        dashpot = values[DASHPOT]
+        viscous, back = dashpot * self._typical_rate, None
+        if self._back.any():
+            back = (self._at_knots_back(variants, values) + viscous) / size
+        return Curve.through((moments - viscous) / size, dashpot / size, back)
 
     def _moments(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Varying:
         """Moments of a model on one way out at the speed of the runs, at KNOTS."""

@@ -62,13 +62,15 @@ def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Corr
     """
     D, curve = np.linspace(0.0, furthest, ALONG), exact.curve
     area = np.stack([way.area for way in exact.ways])
+    speed = np.array([way.speed for way in exact.ways])[:, None]
     off: dict[str, list[list[PchipInterpolator]]] = {"force": [], "middle": []}
     for flag in (False, True):
         back = np.full(D.shape, flag)
         gamma, slope = (
             gamma_of(foretold, D, back, order).value.reshape(*D.shape, -1) for order in (0, 1)
         )
-        work = np.sum(area * slope * curve.at(gamma, back[:, :, None]), axis=2)
+        rate = slope * (-speed if flag else speed)
+        work = np.sum(area * slope * curve.at(gamma, rate, back[:, :, None]), axis=2)
         force, middle = (of_ways(foretold, Varying(D), back, n).value for n in ("rest", "middle"))
         of_runs = [(way, D[:, r], back[:, r]) for r, way in enumerate(exact.ways)]
         for name, known, own in (

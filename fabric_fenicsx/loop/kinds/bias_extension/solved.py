@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any
 
@@ -61,6 +62,7 @@ class Way:
         gamma: their angles [rad], (n, GROUPS) at n travels.
         rest: force that is not the work of the crossings' curve [N].
         middle: mean shear angle of the middle zone [rad].
+        speed: dD/dt [mm/s], negative on the way back.
         back: the way back; None where it is taken to be the way out.
     """
 
@@ -68,6 +70,7 @@ class Way:
     gamma: PchipInterpolator
     rest: PchipInterpolator
     middle: PchipInterpolator
+    speed: float
     back: Way | None = None
 
     def at(self, name: str, D: Array, back: Flags, order: int = 0) -> Array:
@@ -80,8 +83,9 @@ class Way:
 
     def force(self, D: Array, back: Flags, curve: Curve) -> Array:
         """Force [N] of a strip that goes as it was solved, with a curve, at some travels, (n,)."""
-        moment = curve.at(self.at("gamma", D, back), back[:, None])
-        work = self.area * self.at("gamma", D, back, 1) * moment
+        flags, slope = back[:, None], self.at("gamma", D, back, 1)
+        rate = slope * np.where(flags, -self.speed, self.speed)
+        work = self.area * slope * curve.at(self.at("gamma", D, back), rate, flags)
         return np.asarray(self.at("rest", D, back) + work.sum(axis=1))
 
 
@@ -94,6 +98,7 @@ class Solved:
         ways: of each run.
         passed: angles of all groups at some travels of all runs, out and back [rad], (n,).
         weight: A dγ/dD there, (n,).
+        rate: dγ/dt there [rad/s], (n,).
         back: whether on the way back, (n,).
         work: the weight times the curve's moments, (n,).
     """
@@ -102,6 +107,7 @@ class Solved:
     ways: tuple[Way, ...]
     passed: Array
     weight: Array
+    rate: Array
     back: Flags
     work: Array
 
@@ -111,13 +117,17 @@ class Solved:
         every = [(w, np.linspace(0.0, D, TRAVELS)) for w, D in zip(ways, furthest, strict=True)]
         every += [(w.back, D) for w, D in every if w.back is not None]
         passed = np.concatenate([way.gamma(D).ravel() for way, D in every])
-        weight = np.concatenate([(way.area * way.gamma(D, 1)).ravel() for way, D in every])
+        weight, rate = (
+            np.concatenate([(by(way) * way.gamma(D, 1)).ravel() for way, D in every])
+            for by in (attrgetter("area"), attrgetter("speed"))
+        )
         back = np.arange(len(passed)) >= TRAVELS * GROUPS * len(ways)
-        return cls(curve, tuple(ways), passed, weight, back, weight * curve.at(passed, back))
+        work = weight * curve.at(passed, rate, back)
+        return cls(curve, tuple(ways), passed, weight, rate, back, work)
 
     def apart(self, curve: Curve) -> float:
         """By how much of its work a curve differs from the one that strips were solved with."""
-        mine = self.weight * curve.at(self.passed, self.back)
+        mine = self.weight * curve.at(self.passed, self.rate, self.back)
         total = float(np.abs(mine).sum())
         return float(np.abs(mine - self.work).sum()) / max(total, 1e-300)
 
@@ -357,12 +367,14 @@ def _way(path: StripPath, group: npt.NDArray[np.int64], curve: Curve) -> Way:
     area = np.bincount(group, path.area, GROUPS).astype(np.float64)
     gamma = np.stack([np.bincount(group, path.area * row, GROUPS) / area for row in path.gamma])
     of_travel = PchipInterpolator(path.travel, gamma)
-    work = np.sum(area * of_travel(path.travel, 1) * curve(gamma), axis=1)
+    slope = of_travel(path.travel, 1)
+    work = np.sum(area * slope * curve(gamma, path.speed * slope), axis=1)
     return Way(
         area,
         of_travel,
         PchipInterpolator(path.travel, path.force - work),
         PchipInterpolator(path.travel, path.middle),
+        path.speed,
         None if path.back is None else _way(path.back, group, curve.back or curve),
     )
 

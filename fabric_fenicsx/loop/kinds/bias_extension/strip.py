@@ -2,7 +2,7 @@
 
 A law of the crossings without memory is known by its curve m(γ); any other goes through one such
 curve on the way out and through another on the way back. The strip is solved with these curves, as
-tables, so that nothing is compiled for another law.
+tables, and a linear dashpot, so that nothing is compiled for another law.
 """
 
 from __future__ import annotations
@@ -55,19 +55,21 @@ NOTHING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A moment per area m(γ) [N/mm] at KNOTS, monotone cubic in between, odd.
+    """A moment per area m(γ) + β γ̇ [N/mm], m by its values at KNOTS, monotone cubic between, odd.
 
     Attributes:
-        moments: at the knots, not falling, 0 at first.
+        moments: m at the knots, not falling, 0 at first.
+        dashpot: β [N s/mm].
         back: the curve on the way back; None: the same.
     """
 
     moments: tuple[float, ...]
+    dashpot: float = 0.0
     back: Curve | None = None
 
     @classmethod
-    def through(cls, moments: Array, back: Array | None = None) -> Curve:
-        """The nearest that does not fall, and on the way back.
+    def through(cls, moments: Array, dashpot: float = 0.0, back: Array | None = None) -> Curve:
+        """The nearest with m that does not fall, on the way back with another m.
 
         Raises:
             SolveError: a moment is not a number.
@@ -76,26 +78,26 @@ class Curve:
             raise SolveError("the moment of the crossings is not a number")
         rising = np.maximum.accumulate(np.maximum(moments, 0.0))
         least = LEAST_SLOPE * max(float(rising[-1]), NOTHING) * np.radians(KNOTS)
-        return cls(
-            (0.0, *(rising + least)[1:].tolist()), None if back is None else cls.through(back)
-        )
+        on_the_way_back = None if back is None else cls.through(back, dashpot)
+        return cls((0.0, *(rising + least)[1:].tolist()), dashpot, on_the_way_back)
 
-    def __call__(self, gamma: Array) -> Array:
-        """At shear angles [rad]."""
-        return np.asarray(np.sign(gamma) * _cubics(self)(np.abs(gamma)))
+    def __call__(self, gamma: Array, rate: Array | float = 0.0) -> Array:
+        """At shear angles [rad] and rates [rad/s]."""
+        m = np.sign(gamma) * _cubics(self)(np.abs(gamma))
+        return np.asarray(m + self.dashpot * rate)
 
-    def at(self, gamma: Array, back: Flags) -> Array:
-        """At shear angles [rad] on either way; flags as many, or one for several angles."""
-        out = self(gamma)
-        return out if self.back is None else np.where(back, self.back(gamma), out)
+    def at(self, gamma: Array, rate: Array, back: Flags) -> Array:
+        """The same on either way; flags as many, or one for several angles."""
+        out = self(gamma, rate)
+        return out if self.back is None else np.where(back, self.back(gamma, rate), out)
 
     @property
     def idle(self) -> bool:
         """Whether it does next to nothing."""
-        return self.moments[-1] <= NOTHING
+        return self.moments[-1] <= NOTHING and self.dashpot == 0.0
 
     def law(self, area: float) -> TabulatedSpring:
-        """Of a crossing that stands for an area [mm²]."""
+        """Of a crossing that stands for an area [mm²], the dashpot apart."""
         return TabulatedSpring(
             tuple(np.radians(KNOTS).tolist()), tuple(area * m for m in self.moments)
         )
@@ -118,6 +120,7 @@ class StripPath:
         gamma: shear angles that the crossings feel [rad], (n, n_crossings).
         middle: mean angle between the tows' axes in the middle zone [rad], (n,).
         area: of fabric that each crossing stands for [mm²], (n_crossings,).
+        speed: dD/dt [mm/s], negative on the way back.
         back: its way back from there; None where it was not solved.
     """
 
@@ -126,6 +129,7 @@ class StripPath:
     gamma: Array
     middle: Array
     area: Array
+    speed: float
     back: StripPath | None = None
 
 
@@ -250,8 +254,8 @@ def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:
 
 
 @dataclass(frozen=True)
-class _Table(TabulatedSpring):
-    """A table of moments that is exchanged when its form has been compiled.
+class _Exchanged(TabulatedSpring):
+    """A table of moments and a dashpot that are exchanged when their form has been compiled.
 
     Attributes:
         constants: of the form.
@@ -260,21 +264,23 @@ class _Table(TabulatedSpring):
     constants: list[Any] = field(default_factory=list)
 
     def moment(self, at: Crossing) -> Any:
-        """As of any table."""
+        """That of the table and of the dashpot."""
 
         def number(value: Any) -> Any:
             self.constants.append(at.number(value))
             return self.constants[-1]
 
-        return super().moment(replace(at, number=number))
+        return super().moment(replace(at, number=number)) + number(0.0) * at.rate
 
     def energy(self, gamma: Any, memory: Mapping[str, Any], number: Callable[[Any], Any]) -> Any:
         """None: that of the first table is not that of the next."""
 
-    def exchange(self, table: TabulatedSpring) -> None:
-        """Take the moments of another table, at the same angles."""
-        for constant, values in zip(self.constants, table.numbers_of_cubics(), strict=True):
+    def exchange(self, curve: Curve, area: float) -> None:
+        """Take a curve for a crossing that stands for an area [mm²]."""
+        *table, dashpot = self.constants
+        for constant, values in zip(table, curve.law(area).numbers_of_cubics(), strict=True):
             constant.value[:] = values
+        dashpot.value = area * curve.dashpot
 
 
 @lru_cache(maxsize=KEPT)
@@ -291,11 +297,11 @@ class _Strip:
     """
 
     def __init__(self, case: BiasExtensionCase) -> None:
-        self._tables: list[_Table] = []
+        self._tables: list[_Exchanged] = []
 
-        def law(area: float) -> _Table:
+        def law(area: float) -> _Exchanged:
             table = Curve.through(KNOTS).law(area)
-            self._tables.append(_Table(table.angles, table.moments))
+            self._tables.append(_Exchanged(table.angles, table.moments))
             self._area = area
             return self._tables[-1]
 
@@ -325,7 +331,7 @@ class _Strip:
 
     def _take(self, curve: Curve) -> None:
         for table in self._tables:
-            table.exchange(curve.law(self._area))
+            table.exchange(curve, self._area)
 
     def pulled(self, case: BiasExtensionCase, curve: Curve) -> StripPath:
         """Pull it, and let it back with the curve of that way."""
@@ -348,8 +354,11 @@ class _Strip:
         travel = np.array([crosshead(case, t) for t in time])
         gamma, turn = np.array(angles), int(np.argmin(np.abs(time - out))) + 1
 
-        def path(rows: slice, back: StripPath | None = None) -> StripPath:
-            return StripPath(travel[rows], force[rows], gamma[rows], middle[rows], area, back)
+        speed = case.rate_mm_min / 60.0
+
+        def path(rows: slice, *more: Any) -> StripPath:
+            return StripPath(travel[rows], force[rows], gamma[rows], middle[rows], area, *more)
 
         # Of the turn itself the way back has no force: the moments have just changed.
-        return path(slice(turn), path(slice(None, turn - 1, -1)) if case.unload else None)
+        back = path(slice(None, turn - 1, -1), -speed) if case.unload else None
+        return path(slice(turn), speed, back)
