@@ -1,10 +1,11 @@
-"""Diagnose published strips, by themselves and with picture frames, and foretell another size.
+"""Diagnose published strips, by themselves and with picture frames, and foretell other strips.
 
-    python scripts/strips_page.py OUT STRIP ... --frames FRAME ... [--effects NAME,...]
+    python scripts/strips_page.py OUT STRIP ... [--other STRIP] --frames FRAME ... [--effects NAMES]
 
-STRIP and FRAME are folders of measurements of one fabric. Diagnoses and runs go into OUT, where
-those of before are taken as they are; docs/measured_strips.md is written. The strip that is
-foretold has the size that SIZE says and none of the readings.
+STRIP and FRAME are folders of measurements of one fabric, ``--other`` one of the same fabric from
+another laboratory, which is foretold. Diagnoses and runs go into OUT, where those of before are
+taken as they are; docs/measured_strips.md and its picture are written. The strip of SIZE has none
+of the readings.
 """
 
 from __future__ import annotations
@@ -13,70 +14,132 @@ import argparse
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import yaml
+from matplotlib.figure import Figure
 
 import fabric_fenicsx as ff
+from fabric_fenicsx.loop.fabric import fabric_content, write_fabric
+from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
+from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
 
 PAGE = Path(__file__).parents[1] / "docs" / "measured_strips.md"
+PICTURE = PAGE.parent / "images" / "measured_strips.png"
+EFFECTS = "shear_locking,crossover_slip,tow_uncrimping"
 #: Length, width [mm] and travels [mm] at which the strip's angle is foretold.
 SIZE, TRAVELS = (450.0, 150.0), (20.0, 40.0, 60.0, 80.0, 105.0)
 #: Speed of its crosshead [mm/min].
 SPEED = 50.0
+#: Slip [mm] beyond what the springs give, from which on a crossing counts as slipping.
+SLIPPED = 0.05
 
 
-def command(*words: str) -> None:
-    """A command of this package."""
-    program = Path(sys.executable).parent / "fabric-fenicsx"
-    subprocess.run([str(program), *words, "--quiet"], check=True)
+@dataclass(frozen=True)
+class Tried:
+    """A model of strips: its effects, its errors [N] and the file with its fabric."""
+
+    effects: tuple[str, ...]
+    fit: float
+    holdout: float
+    fabric: Path
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return " + ".join(f"`{name}`" for name in self.effects) or "baseline, pinned"
+
+    @property
+    def key(self) -> str:
+        """Of folders."""
+        return "_".join(self.effects) or "baseline"
 
 
-def diagnosed(folders: Sequence[Path], out: Path, effects: str | None) -> dict[str, Any]:
-    """The report of folders together, of the strips among them."""
+def diagnosed(
+    folders: Sequence[Path], out: Path, effects: Sequence[str], *, alone: bool
+) -> tuple[dict[str, Any], list[Tried]]:
+    """The report of folders together, of the strips among them, and the models that were tried.
+
+    Args:
+        folders: of measurements.
+        out: for what is written.
+        effects: names of those to try.
+        alone: the folders are strips; pairs of the effects are tried as well.
+    """
     if not (out / "report.json").exists():
-        chosen = ["--effects", effects] if effects else []
-        command("diagnose", *map(str, folders), "--out", str(out), *chosen)
+        measurements = [ff.read_measurement(folder) for folder in folders]
+        found = ff.diagnose(measurements, out, effects=effects)
+        d = found.diagnoses[-1]
+        strips = [m for m in measurements if m.test == "bias_extension"]
+        models = [((), d.baseline, d.holdout_before)]
+        models += [((c.effect.name,), c.fit, c.holdout) for c in d.candidates if c.fit is not None]
+        if alone:
+            model = partial(BiasExtension, like=d.experiment)
+            for pair in combinations(effects, 2):
+                other = ff.diagnose(strips, effects=pair, models={"bias_extension": model})
+                (two,) = other.diagnoses
+                best, held = (two.final, two.holdout_after)
+                if two.best is not None:
+                    best, held = two.best, two.holdout_best
+                if len(best.variants) == 2:
+                    models.append((pair, best, held))
+        tried = []
+        for names, fit, holdout in models:
+            file = f"fabric_{'_'.join(names) or 'baseline'}.yaml"
+            shown: Diagnosis = replace(d, best=fit, verdict="unexplained")
+            write_fabric(out, fabric_content([(shown, strips)], out, nearest=True), file)
+            rows = fit.used & d.experiment.readings.first
+            tried.append({"effects": names, "fit": fit.rms(rows), "holdout": holdout, "file": file})
+        (out / "tried.json").write_text(json.dumps(tried))
     report: dict[str, Any] = json.loads((out / "report.json").read_text())
-    return report.get("tests", {}).get("bias_extension", report)  # type: ignore[no-any-return]
+    report = report.get("tests", {}).get("bias_extension", report)
+    models = json.loads((out / "tried.json").read_text())
+    return report, [
+        Tried(tuple(m["effects"]), m["fit"], m["holdout"], out / m["file"]) for m in models
+    ]
 
 
-def foretold(out: Path, spacing: float) -> pd.DataFrame:
-    """The strip of SIZE with the fabric of a diagnosis, with standard errors."""
-    folder = out / "strip"
-    if not (folder / "uncertainty.csv").exists():
-        nearest = out / "fabric_nearest.yaml"
+def nearest(out: Path) -> Path:
+    """The fabric of the model that was found, or that came nearest."""
+    file = out / "fabric_nearest.yaml"
+    return file if file.exists() else out / "fabric.yaml"
+
+
+def pulled(
+    folder: Path,
+    fabric: Path,
+    spacing: float,
+    size: tuple[float, float] = SIZE,
+    travel: float = TRAVELS[-1],
+    speed: float = SPEED,
+    uncertainty: bool = False,
+) -> Path:
+    """Pull a strip of a size (length, width) [mm] with a fabric; the folder of its results."""
+    if not (folder / "result.json").exists():
         case = {
             "test": "bias_extension",
-            "length_mm": SIZE[0],
-            "width_mm": SIZE[1],
+            "length_mm": size[0],
+            "width_mm": size[1],
             "warp_spacing_mm": spacing,
             "weft_spacing_mm": spacing,
-            "travel_mm": TRAVELS[-1],
-            "rate_mm_min": SPEED,
+            "travel_mm": travel,
+            "rate_mm_min": speed,
         }
-        (out / "strip.yaml").write_text(yaml.safe_dump(case))
-        fabric = nearest if nearest.exists() else out / "fabric.yaml"
-        where = ("--out", str(folder), "--fabric", str(fabric), "--uncertainty")
-        command("run", str(out / "strip.yaml"), *where)
-    return pd.read_csv(folder / "uncertainty.csv")
-
-
-def rows_of_errors(report: dict[str, Any]) -> Iterator[str]:
-    """Errors before and with each model, fitted and held out."""
-    error = report["error"]
-    yield row("baseline, pinned", error["before"]["fit"], error["before"]["holdout"])
-    tried = [c for c in report["candidates"] if c["error_fit"] is not None]
-    for c in sorted(tried, key=lambda c: c["criterion"] or 0.0):
-        yield row(f"`{c['name']}`", c["error_fit"], c["error_holdout"])
-    best = report["best"] or report["model"]
-    if best["effects"]:
-        names = " + ".join(f"`{e['name']}` ({e['variant']})" for e in best["effects"])
-        yield row(f"**{names}**", best["error_fit"], best["error_holdout"])
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder.with_suffix(".yaml")
+        path.write_text(yaml.safe_dump(case))
+        program = Path(sys.executable).parent / "fabric-fenicsx"
+        words = ["run", path, "--out", folder, "--fabric", fabric, "--quiet"]
+        words += ["--uncertainty"] if uncertainty else ["--no-pictures"]
+        subprocess.run([str(program), *map(str, words)], check=True)
+    return folder
 
 
 def row(*cells: Any) -> str:
@@ -99,53 +162,185 @@ def at_travels(table: pd.DataFrame, name: str) -> list[float]:
     return np.interp(TRAVELS, table["displacement_mm"], table[name]).tolist()
 
 
-def page(
-    sets: dict[str, list[Path]],
-    reports: dict[str, dict[str, Any]],
-    strips: dict[str, pd.DataFrame],
-) -> str:
-    """The page."""
-    text = ["# Published strips, and another size foretold", "", OPENING]
-    for name, report in reports.items():
-        runs = [run for m in report["measurements"] for run in m["runs"]]
-        held = ", ".join(run["label"] or run["file"] for run in runs if run["role"] == "holdout")
-        titles = "; ".join(ff.read_measurement(folder).title for folder in sets[name])
-        text += [f"## {name}", "", f"{titles}.", "", f"**{report['headline']}**", ""]
-        text += [" ".join(report["notes"]), ""]
-        text += [f"| model | fitted, rms [N] | held out ({held}) [N] |", "|---|---|---|"]
-        text += [*rows_of_errors(report), ""]
-        noise = report["error"]["noise"]
-        text += [f"A reading scatters by {noise:.2g} N. {parameters(report)}.", ""]
-    length, width = SIZE
-    strip = ff.BiasStrip(length, width)
-    angles = strip.angle(np.array(TRAVELS))
-    text += [f"## {width:g} x {length:g} mm, foretold", "", FORETOLD, ""]
-    text += [row("travel [mm]", *(f"{t:g}" for t in TRAVELS)), "|---" * (1 + len(TRAVELS)) + "|"]
-    text += [row("classical formula, angle [°]", *(f"{np.degrees(a):.1f}" for a in angles))]
-    for name, table in strips.items():
-        mean, std = (
-            at_travels(table, column) for column in ("shear_angle_deg", "shear_angle_deg_fit")
+def angles(table: pd.DataFrame) -> str:
+    """Angles of the middle at the travels."""
+    return ", ".join(f"{a:.1f}" for a in at_travels(table, "shear_angle_deg"))
+
+
+def of_models(
+    report: dict[str, Any], tried: Sequence[Tried], curves: Mapping[str, pd.DataFrame]
+) -> Iterator[str]:
+    """Errors of each model, fitted and held out, and the angles of the large strip with it."""
+    runs = [run for m in report["measurements"] for run in m["runs"]]
+    held = [run["label"] or run["file"] for run in runs if run["role"] == "holdout"]
+    what = f"held out ({', '.join(held)})" if held else report["holdout_source"]
+    places = ", ".join(f"{t:g}" for t in TRAVELS)
+    columns = ["model", "fitted, rms [N]", f"{what} [N]"]
+    columns += [f"{SIZE[1]:g} x {SIZE[0]:g} mm: angle [°] at {places} mm"] if curves else []
+    yield row(*columns)
+    yield "|---" * len(columns) + "|"
+    for model in tried:
+        shown = [angles(curves[model.key])] if model.key in curves else []
+        yield row(model.name, model.fit, model.holdout, *shown)
+    best = report["best"] or report["model"]
+    if best["effects"]:
+        names = " + ".join(f"`{e['name']}` ({e['variant']})" for e in best["effects"])
+        shown = [angles(curves["nearest"])] if "nearest" in curves else []
+        yield row(f"**{names}**", best["error_fit"], best["error_holdout"], *shown)
+
+
+def of_the_other(other: Any, tried: Sequence[Tried], near: Path, out: Path) -> Iterator[str]:
+    """How the strips' models meet another laboratory's strip, of which they have seen nothing."""
+    (run,) = other.runs
+    D, force = run.columns["displacement_mm"], run.columns["force_N"]
+    speed = 60.0 * float((D[-1] - D[0]) / np.ptp(run.columns["time_s"]))
+    size = run.own["length_mm"], run.own["width_mm"]
+    yield row("model", "rms [N]", "of the force, first third", "second", "last")
+    yield "|---|---|---|---|---|"
+    files = {model.name: (model.key, model.fabric) for model in tried}
+    for name, (key, fabric) in {**files, "**nearest**": ("nearest", near)}.items():
+        folder = out / f"other_{key}"
+        pulled(folder, fabric, other.fabric.tow_spacing_mm, size, float(D.max()), speed)
+        curve = pd.read_csv(folder / "curve.csv")
+        rest = np.append(0.0, curve["displacement_mm"]), np.append(0.0, curve["force_N"])
+        expected = np.interp(D, *rest)
+        third = np.minimum(3.0 * D / D.max(), 2.999).astype(int)
+        shares = [expected[third == k].mean() / force[third == k].mean() for k in range(3)]
+        yield row(name, float(np.sqrt(np.mean((expected - force) ** 2))), *map(float, shares))
+
+
+def slip(folder: Path, limit: float) -> tuple[float, float, float, pd.DataFrame]:
+    """When the first crossing slips, and where.
+
+    Args:
+        folder: of a run.
+        limit: how far the springs of a crossing give before it slips [mm].
+
+    Returns:
+        Travel [mm] and angle of the middle [°] then, its distance from the nearest border of the
+        zones [mm], NaN where none slips; and the run's curve.
+    """
+    results = ff.read_results(folder)
+    curve = pd.read_csv(folder / "curve.csv")
+    strip = ff.BiasStrip(*SIZE)
+    for number, (_, line) in zip(results.steps, curve.iterrows(), strict=True):
+        net, state, _ = results.at(number)
+        warp, weft = net.crossings.T
+        size = np.linalg.norm(state.displacement[weft] - state.displacement[warp], axis=1)
+        if size.max() > limit + SLIPPED:
+            place = net.points[warp[size.argmax()], :2]
+            off = min(
+                abs(abs(float(place @ axis)) - free / 2.0)
+                for axis, free in zip(strip.tows, strip.free, strict=True)
+            )
+            return float(line["displacement_mm"]), float(line["shear_angle_deg"]), off, curve
+    return np.nan, np.nan, np.nan, curve
+
+
+def of_slip(fabric: Path, folder: Path) -> Iterator[str]:
+    """Where and when crossings slip, and by how much."""
+    keys = yaml.safe_load(fabric.read_text())["crossover"]
+    limit, stiffness = keys["slip_limit_N"], keys.get("translation_N_mm", 100.0)
+    travel, angle, off, curve = slip(folder, limit / stiffness)
+    columns = ("angle [°]", "slip, largest [mm]", "on the free edges [mm]", "mean [mm]")
+    names = ("shear_angle_deg", "largest_slip_mm", "edge_slip_mm", "mean_slip_mm")
+    yield row("travel [mm]", *(f"{t:g}" for t in TRAVELS))
+    yield "|---" * (1 + len(TRAVELS)) + "|"
+    for column, name in zip(columns, names, strict=True):
+        yield row(column, *(f"{v:.3g}" for v in at_travels(curve, name)))
+    yield ""
+    if np.isfinite(travel):
+        yield (
+            f"With its limit of {limit:.2g} N per crossing the first one slips at {travel:.0f} mm, "
+            f"where the middle is sheared by {angle:.0f}°, {off:.0f} mm from a border of the zones."
         )
-        scatter = at_travels(table, "shear_angle_deg_specimens")
-        cells = zip(mean, std, scatter, strict=True)
-        text += [row(f"{name}: angle [°]", *(f"{a:.1f} ± {s:.1f} ± {z:.1f}" for a, s, z in cells))]
-        force = zip(*(at_travels(table, f"force_N{end}") for end in ("", "_fit")), strict=True)
-        text += [row(f"{name}: force [N]", *(f"{f:.3g} ± {s:.2g}" for f, s in force))]
-    return "\n".join(text) + "\n"
+    else:
+        yield f"With its limit of {limit:.2g} N per crossing none slips."
+    yield REPORTED
 
 
-OPENING = """Forces of strips pulled at 45 degrees, read from published figures, each table by
+def draw(curves: Mapping[str, pd.DataFrame], slipping: Path) -> None:
+    """Angle and slip of the large strip over its travel, and where its crossings slipped."""
+    figure = Figure(figsize=(14.0, 4.6), layout="constrained")
+    angle, size, where = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.6))
+    for name, curve in curves.items():
+        style = {"lw": 2.5, "color": "black"} if name == "nearest" else {}
+        angle.plot(curve["displacement_mm"], curve["shear_angle_deg"], label=name, **style)
+        if curve["largest_slip_mm"].max() > SLIPPED:
+            size.plot(curve["displacement_mm"], curve["largest_slip_mm"], label=name, **style)
+    x = np.linspace(0.0, TRAVELS[-1], 200)
+    angle.plot(x, np.degrees(ff.BiasStrip(*SIZE).angle(x)), "--", color="#7f8c8d", label="formula")
+    angle.set(xlabel="travel [mm]", ylabel="angle of zone A [°]")
+    size.set(xlabel="travel [mm]", ylabel="largest slip [mm]", yscale="log")
+    for axes in (angle, size):
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize="x-small")
+    results = ff.read_results(slipping)
+    net, last, _ = results.at(max(results.steps))
+    warp, weft = net.crossings.T
+    slipped = np.linalg.norm(last.displacement[weft] - last.displacement[warp], axis=1)
+    colour = np.log10(np.maximum(slipped, 1e-2))
+    dots = where.scatter(*net.points[warp, :2].T, c=colour, s=5.0, cmap="magma_r")
+    for border in ff.BiasStrip(*SIZE).borders():
+        where.plot(*border.T, color="#2980b9", lw=0.8)
+    bar = figure.colorbar(dots, ax=where, label=f"slip at {TRAVELS[-1]:g} mm [mm]")
+    bar.set_ticks([-2.0, -1.0, 0.0, 1.0], labels=["≤ 0.01", "0.1", "1", "10"])
+    where.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", title="crossover_slip")
+    figure.savefig(PICTURE, dpi=110)
 
-    fabric-fenicsx diagnose FOLDER ...
+
+def section(name: str, folders: Sequence[Path], report: dict[str, Any]) -> list[str]:
+    """How a diagnosis begins."""
+    titles = "; ".join(ff.read_measurement(folder).title for folder in folders)
+    head = [f"## {name}", "", f"{titles}.", "", f"**{report['headline']}**", ""]
+    return [*head, " ".join(report["notes"]), ""]
+
+
+def numbers(report: dict[str, Any]) -> list[str]:
+    """The noise and the numbers of the nearest model."""
+    noise = report["error"]["noise"]
+    return ["", f"A reading scatters by {noise:.2g} N. {parameters(report)}.", ""]
+
+
+def large(table: Mapping[str, pd.DataFrame]) -> Iterator[str]:
+    """The large strip with the nearest models, and how well these know it."""
+    length, width = SIZE
+    formula = ff.BiasStrip(length, width).angle(np.array(TRAVELS))
+    yield row("travel [mm]", *(f"{t:g}" for t in TRAVELS))
+    yield "|---" * (1 + len(TRAVELS)) + "|"
+    yield row("classical formula, angle [°]", *(f"{np.degrees(a):.1f}" for a in formula))
+    for name, curve in table.items():
+        columns = [f"shear_angle_deg{end}" for end in ("", "_fit", "_specimens")]
+        cells = zip(*(at_travels(curve, column) for column in columns), strict=True)
+        yield row(f"{name}: angle [°]", *(f"{a:.1f} ± {s:.1f} ± {z:.1f}" for a, s, z in cells))
+        force = zip(*(at_travels(curve, f"force_N{end}") for end in ("", "_fit")), strict=True)
+        yield row(f"{name}: force [N]", *(f"{f:.3g} ± {s:.2g}" for f, s in force))
+
+
+OPENING = """# Published strips, and other strips foretold
+
+Forces of strips pulled at 45 degrees, read from published figures, each table by
+
+    fabric-fenicsx diagnose FOLDER ... --effects {effects}
 
 and written here by `python scripts/strips_page.py`. None of the readings is kept in this
 repository. Bold is the model that came nearest; where the verdict is *unexplained* it is not
-accepted, and what it foretells is no more than its best guess.
+accepted, and what it foretells is no more than its best guess. Models of one effect are those of
+the same diagnosis, pairs those of diagnoses with these two effects.
 """
+
+OTHER = """The strip of another laboratory, {size}, of which these models have seen nothing: errors
+of all of its readings, and mean force over that which was read in each third of the travel."""
 
 FORETOLD = """The mean angle of all crossings whose two tows end in no clamp, by the nearest
 model above, which has seen neither this size nor an angle. First ± one standard error of the fit,
-then what specimens differ by; that the model may be another one is in neither."""
+then what specimens differ by; that the model may be another one is in neither: the models of the
+first table, of which some fit hardly worse, differ by more."""
+
+SLIP = """The strip of {size} with `crossover_slip` alone, and where its crossings slipped:"""
+
+REPORTED = """Of woven strips it is reported that yarns slip above some 35 to 40 degrees, first at
+the borders of the zones."""
 
 
 def main() -> None:
@@ -153,19 +348,51 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("strips", type=Path, nargs="+")
+    parser.add_argument("--other", type=Path)
     parser.add_argument("--frames", type=Path, nargs="*", default=[])
-    parser.add_argument("--effects")
+    parser.add_argument("--effects", default=EFFECTS)
     arguments = parser.parse_args()
+    effects = arguments.effects.split(",")
     spacing = ff.read_measurement(arguments.strips[0]).fabric.tow_spacing_mm
-    sets = {"Strips alone": arguments.strips}
-    if arguments.frames:
-        sets["Strips and picture frames"] = [*arguments.frames, *arguments.strips]
-    reports, strips = {}, {}
-    for name, folders in sets.items():
+    text = [OPENING.format(effects=arguments.effects)]
+    known: dict[str, pd.DataFrame] = {}
+
+    def add(name: str, folders: Sequence[Path], **how: bool) -> tuple[Path, list[Tried]]:
         out = arguments.out / name.lower().replace(" ", "_")
-        reports[name] = diagnosed(folders, out, arguments.effects)
-        strips[name] = foretold(out, spacing)
-    PAGE.write_text(page(sets, reports, strips))
+        report, tried = diagnosed(folders, out, effects, **how)
+        curves: dict[str, pd.DataFrame] = {}
+        if how["alone"]:
+            for model in tried:
+                folder = pulled(out / f"large_{model.key}", model.fabric, spacing)
+                curves[model.key] = pd.read_csv(folder / "curve.csv")
+        if folders != [arguments.other]:
+            folder = pulled(out / "large", nearest(out), spacing, uncertainty=True)
+            known[name] = pd.read_csv(folder / "uncertainty.csv")
+            if curves:
+                curves["nearest"] = pd.read_csv(folder / "curve.csv")
+        text.extend([*section(name, folders, report), *of_models(report, tried, curves)])
+        text.extend(numbers(report))
+        if curves:
+            draw(curves, out / "large_crossover_slip")
+        return out, tried
+
+    out, tried = add("Strips alone", arguments.strips, alone=True)
+    if arguments.other:
+        other = ff.read_measurement(arguments.other)
+        own = other.runs[0].own
+        size = f"{own['width_mm']:g} x {own['length_mm']:g} mm"
+        text += ["## Another laboratory, foretold", "", OTHER.format(size=size), ""]
+        text += [*of_the_other(other, tried, nearest(out), out), ""]
+        add("Another laboratory alone", [arguments.other], alone=False)
+    if arguments.frames:
+        add("Strips and picture frames", [*arguments.frames, *arguments.strips], alone=False)
+    length, width = SIZE
+    text += [f"## {width:g} x {length:g} mm, foretold", "", FORETOLD, "", *large(known), ""]
+    slipping = next(model for model in tried if model.effects == ("crossover_slip",))
+    text += ["## Slip", "", SLIP.format(size=f"{width:g} x {length:g} mm"), ""]
+    text += [*of_slip(slipping.fabric, out / "large_crossover_slip"), ""]
+    text += ["![Angle, slip and where crossings slipped](images/measured_strips.png)"]
+    PAGE.write_text("\n".join(text) + "\n")
 
 
 if __name__ == "__main__":

@@ -72,16 +72,13 @@ def test_formula_by_hand():
     assert np.isnan(strip.angle(42.0))  # beyond (√2 − 1) D
 
 
-@pytest.mark.parametrize("bias", [45.0, 35.0])
-def test_constant_shear_has_the_formulas_angle(bias):
-    """Imposed on a net: tows keep their length, clamps turn none, and A has the formula's angle.
+def imposed(bias, travel=20.0):
+    """A net of constant shear in each zone: strip, net, its places, angles [rad], zones.
 
-    Angles between chords of crossings that lie two spacings within a zone; in C it is zero, and
-    in B the two families' turns, which add up to that of A and are halves of it at 45°.
+    Angles are between chords; which crossings lie two spacings within a zone comes last.
     """
     strip = BiasStrip(250.0, 100.0, bias)
     net = mesh_net(strip.layout((2.5 * np.sqrt(2.0),) * 2))
-    travel = 20.0
     places = strip.places(net.points, travel)
     at = net.points[net.crossings[:, 0]]
     zone = strip.gripped(at)
@@ -89,6 +86,18 @@ def test_constant_shear_has_the_formulas_angle(bias):
     near = [strip.gripped(at + np.append(k * axis, 0.0)) for axis in strip.tows for k in steps]
     inner = (np.array(near) == zone).all(axis=0)
     gamma = axes_shear(TowAxes.of(net, reach=1).at(places - net.points))
+    return strip, net, places, gamma, zone, inner
+
+
+@pytest.mark.parametrize("bias", [45.0, 35.0])
+def test_constant_shear_has_the_formulas_angle(bias):
+    """Imposed on a net: tows keep their length, clamps turn none, and A has the formula's angle.
+
+    In C the angle is zero, and in B the two families' turns, which add up to that of A and are
+    halves of it at 45°.
+    """
+    travel = 20.0
+    strip, net, places, gamma, zone, inner = imposed(bias, travel)
     exact = strip.angle(travel)
     assert inner[zone == 0].sum() > 50
     assert gamma[inner & (zone == 0)] == pytest.approx(exact, abs=1e-12)
@@ -159,6 +168,31 @@ def test_what_a_strip_cannot_be():
 # The net -------------------------------------------------------------------------------------
 
 
+def refined(folder):
+    """A strip of 40 x 100 mm pulled by 16 mm, with 4, 8 and 16 meshes' diagonals over its width.
+
+    Returns:
+        Forces [N], angles of A [°] and works [N mm], (3, 3), their limits, and the same of constant
+        shear in each zone.
+    """
+    strip = BiasStrip(100.0, 40.0)
+    found = []
+    for diagonals in (4, 8, 16):
+        spacing = 40.0 / diagonals / np.sqrt(2.0)
+        own = folder / str(diagonals)
+        own.mkdir()
+        last, _ = pulled(
+            own, warp_spacing_mm=spacing, weft_spacing_mm=spacing, travel_mm=16, **SOFT
+        )
+        work = pd.read_csv(own / "steps.csv")["stored_N_mm"].iloc[-1]
+        found.append([last["force_N"], last["shear_angle_deg"], work])
+    values = np.transpose(found)
+    travel = np.linspace(0.0, 16.0, 1001)[1:]
+    exact = strip.force(lambda gamma: 0.02 * gamma + 0.08 * gamma**3, strip.angle(travel))
+    bounds = exact[-1], np.degrees(strip.angle(travel[-1])), np.sum(exact) * travel[0]
+    return values, 2.0 * values[:, -1] - values[:, -2], bounds
+
+
 def test_converges_with_spacing_to_less_than_constant_shear(tmp_path):
     """Force and angle are of first order in the spacing: each halving halves the change.
 
@@ -166,25 +200,10 @@ def test_converges_with_spacing_to_less_than_constant_shear(tmp_path):
     constant shear in each zone, so by the theorem of least energy their own costs less work, by
     some per cent; and its zone A shears less.
     """
-    strip = BiasStrip(100.0, 40.0)
-    force, angle, work = [], [], []
-    for diagonals in (4, 8, 16):
-        spacing = 40.0 / diagonals / np.sqrt(2.0)
-        folder = tmp_path / str(diagonals)
-        folder.mkdir()
-        last, _ = pulled(
-            folder, warp_spacing_mm=spacing, weft_spacing_mm=spacing, travel_mm=16, **SOFT
-        )
-        force.append(last["force_N"])
-        angle.append(last["shear_angle_deg"])
-        work.append(pd.read_csv(folder / "steps.csv")["stored_N_mm"].iloc[-1])
-    for values in (force, angle):
+    found, limit, bounds = refined(tmp_path)
+    for values in found[:2]:
         change = np.diff(values)
         assert change[0] / change[1] == pytest.approx(2.0, rel=0.15)
-    travel = np.linspace(0.0, 16.0, 1001)[1:]
-    exact = strip.force(lambda gamma: 0.02 * gamma + 0.08 * gamma**3, strip.angle(travel))
-    limit = 2.0 * np.array([force, angle, work])[:, -1] - np.array([force, angle, work])[:, -2]
-    bounds = exact[-1], np.degrees(strip.angle(travel[-1])), np.sum(exact) * travel[0]
     assert (limit < bounds).all()
     assert limit == pytest.approx(bounds, rel=0.05)
 
@@ -301,6 +320,11 @@ def test_goes_on_where_it_stopped(tmp_path):
     ("keys", "said"),
     [
         ("length_mm: 105", "length_mm: at least 107.35, so that two tows of each family end in no"),
+        (
+            "length_mm: 30\nwidth_mm: 20",
+            "length_mm: 30, allowed is at least 33.333 where the strip is 20 mm wide and tows are "
+            "4.71 mm apart (warp_spacing_mm, weft_spacing_mm): no crossing would lie about its",
+        ),
         ("bias_deg: 90", "bias_deg: 90, allowed is a number greater than 0"),
         ("warp_spacing_mm: 1.0e-5", "at most 4000000 are allowed"),
         ("slip: 1", "slip: unknown key"),

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from measurements.strips import corners
+from measurements.strips import pulled as by_the_rig
 from scipy.interpolate import PchipInterpolator
 
 from fabric_fenicsx.errors import InputError
@@ -16,7 +18,7 @@ from fabric_fenicsx.loop.kinds.bias_extension.frame_law import (
     locking,
     locking_variant,
 )
-from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
+from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension, _backward
 from fabric_fenicsx.loop.kinds.bias_extension.quantities import read_together
 from fabric_fenicsx.loop.kinds.bias_extension.strip import (
     KNOTS,
@@ -107,6 +109,35 @@ def test_a_dashpot_costs_its_work():
     exact, _ = by_the_net(run, keys_of(values))
     # The first step begins to move: what the dashpot does in it is the net's choice of time step.
     assert force[3:] == pytest.approx(exact[3:], abs=0.02 * exact.max())
+
+
+def test_what_slipped_is_not_undone_on_the_way_back():
+    """Forces and angles of the middle against the rig's finite elements, at a limit as solved."""
+    law = {"k1_N_mm": 0.02, "k3_N_mm": 0.2, "translation_N_mm": 10.0}
+    times, places = corners(1.0, TRAVEL, 0.0)
+    per_force = 2.5
+    law["slip_limit_N"] = 1.0 / per_force
+    exact = by_the_rig(LENGTH, times, places, law=law, steps=160, readings=57)
+    columns = {name: exact[name] for name in ("time_s", "displacement_mm", "force_N")}
+    run = Run("run.csv", False, "", columns, own={"length_mm": LENGTH, "width_mm": WIDTH})
+    test = BiasExtension([measured(run)])
+    (slip,) = (v for e in test.effects if e.name == "crossover_slip" for v in e.variants)
+    values = VALUES | {"slip_1_N": per_force}
+    test.settle((slip,), values)
+    back = np.arange(57) > 28
+    off = (test.predict((slip,), values)[0] - exact["force_N"])[back]
+    assert np.sqrt(np.mean(off**2)) < 0.005 * exact["force_N"].max()
+    angle = test.middle_angle((slip,), values)[back]
+    assert angle == pytest.approx(exact["shear_angle_deg"][back], abs=0.1)
+
+
+def test_what_is_pulled_once_is_not_solved_back(strip):
+    assert not strip._back.any() and strip.curve.back is None
+    assert all(path.back is None for path in strip._strips.paths.values())
+    # At rest a crosshead is on the way that it came.
+    D = np.array([0.0, 1.0, 1.0, 0.5, 0.5, 1.0])[:, None]
+    speed = np.array([1.0, 1.0, 0.0, -1.0, 0.0, 1.0])[:, None]
+    assert _backward(D, speed)[:, 0].tolist() == [False, False, False, True, True, False]
 
 
 @pytest.mark.parametrize(

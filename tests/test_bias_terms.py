@@ -48,6 +48,16 @@ def test_terms_of_a_strip_are_those_that_it_can_show():
     assert {t.test for t in strip_terms(RANGES)} == {"bias_extension"}
 
 
+def test_terms_know_whose_general_form_they_are(back):
+    """By name; of what is in the list of effects."""
+    named = {e.name for e in back.effects}
+    of = {t.name: t.general_form_of for t in back.terms}
+    assert {name for names in of.values() for name in names} <= named
+    assert of["dissipative_moment_of_path"] == ("crossover_friction",)
+    assert of["odd_moment_of_angle"] == ("shear_locking",)
+    assert of["elastic_moment_of_largest_angle"] == ()
+
+
 def test_angles_alone_have_no_terms():
     test = BiasExtension([with_angles(of_runs(run_of(force=np.full(29, np.nan))))])
     assert test.terms == [] and "shear_locking" in test.alike
@@ -237,6 +247,24 @@ def test_a_law_on_no_list_is_discovered(laws, share, depends_on):
     named = [found["depends_on"], *(rival.get("depends_on", []) for rival in found["rivals"])]
     assert any(depends_on in names for names in named)
     assert report["error"]["after"]["holdout"] < 1.25 * sigma < report["error"]["before"]["holdout"]
+
+
+@pytest.mark.slow
+def test_a_listed_effect_has_unlisted_rivals():
+    """Damage at more noise looks like friction that grows with the angle; both are named.
+
+    That friction itself is not told from its own general forms goes without saying.
+    """
+    measurement, _ = measured(programmes(damaged), 0.015, seed=1)
+    report = diagnose([measurement]).report
+    (effect,) = report["effects"]
+    damage = "elastic_moment_of_largest_angle"
+    assert damage in effect["rivals"]
+    assert not any(name.startswith("dissipative") for name in effect["rivals"])
+    (tried,) = (c for c in report["candidates"] if c["name"] == damage)
+    assert tried["criterion"] < report["criterion"]["after"] + 30.0
+    advice = [t for t in report["next_tests"] if t["effects"] == [effect["name"], damage]]
+    assert advice[0]["separation"] > 3.0 and "unload" in advice[0]["do"]
 
 
 @pytest.mark.slow

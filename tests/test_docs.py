@@ -20,6 +20,7 @@ import yaml
 from fabric_fenicsx import rigs
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.loop.inference.criteria import CRITERIA
+from fabric_fenicsx.loop.kinds.bias_extension.effects import BIAS_EXTENSION_EFFECTS
 from fabric_fenicsx.loop.kinds.cantilever.effects import CANTILEVER_EFFECTS
 from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
 from fabric_fenicsx.loop.kinds.picture_frame.effects import PICTURE_FRAME_EFFECTS
@@ -44,7 +45,12 @@ def blocks(page):
 def test_every_form_of_every_effect_is_in_the_tutorial():
     text = (DOCS / "tutorial_measurements.md").read_text(encoding="utf-8")
     rows = dict(re.findall(r"^\| (\w+) \| (.*) \|$", text.split("## What is tried")[1], re.M))
-    effects = (*PICTURE_FRAME_EFFECTS, *CANTILEVER_EFFECTS, *DRAPE_EFFECTS)
+    effects = (
+        *PICTURE_FRAME_EFFECTS,
+        *BIAS_EXTENSION_EFFECTS,
+        *CANTILEVER_EFFECTS,
+        *DRAPE_EFFECTS,
+    )
     for effect in effects:
         assert [v.label for v in effect.variants if v.label not in rows[effect.name]] == []
 

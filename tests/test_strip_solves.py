@@ -6,11 +6,13 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from measurements.strips import WIDTH, corners, pulled
+from scipy.interpolate import PchipInterpolator
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop import workers
@@ -24,12 +26,12 @@ SLIPPING = {"crossover.slip_limit_N": 0.3, "crossover.translation_N_mm": 10.0}
 CRIMPED = {"tow.crimp_strain": 0.02}
 
 
-def case(changes=None, length=40.0, travel=5.0):
-    own = {"length_mm": length, "width_mm": 20.0}
+def case(changes=None, length=40.0, travel=5.0, width=20.0, **more):
+    own = {"length_mm": length, "width_mm": width}
     run = Run("run.csv", False, "", {}, own=own)
     fabric = FabricKeys(areal_density_kg_m2=0.3, tow_spacing_mm=5.0)
     measured = Measurement(Path(), "bias_extension", "", fabric, BiasExtensionRig(), None, (run,))
-    return strip_case(measured, run, travel, 1.0, changes or {}, steps=6)
+    return strip_case(measured, run, travel, 1.0, changes or {}, **{"steps": 6, **more})
 
 
 def hasty(case):
@@ -60,6 +62,50 @@ def test_a_model_that_is_kept_remembers_nothing(changes):
     assert same(solved_strip(case(changes), SOFT), fresh)
     strip._strip.cache_clear()
     assert same(solved_strip(case(changes | other), STIFF), between)
+
+
+def test_a_way_back_is_solved_as_such():
+    """Of a strip that slips, against the rig's finite elements with the law itself."""
+    moments = 0.02 * GAMMA + 0.2 * GAMMA**3
+    way = 14.0
+    path = solved_strip(
+        case(SLIPPING, 2.0 * WIDTH, way, WIDTH, back=True, steps=40), Curve.through(moments)
+    )
+    law = {"k1_N_mm": 0.02, "k3_N_mm": 0.2, "slip_limit_N": 0.3, "translation_N_mm": 10.0}
+    times, places = corners(1.0, way, 0.0)
+    exact = pulled(2.0 * WIDTH, times, places, law=law, steps=160, readings=57)
+    force, angle = exact["force_N"], exact["shear_angle_deg"]
+    at = exact["displacement_mm"]
+    assert np.diff(path.back.travel).min() > 0.0 == path.back.travel[0]
+    for rows, one in ((slice(29), path), (slice(30, None), path.back)):
+        near = PchipInterpolator(one.travel, one.force)(at[rows])
+        assert near == pytest.approx(force[rows], abs=0.01 * force.max())
+        middle = np.degrees(PchipInterpolator(one.travel, one.middle)(at[rows]))
+        assert middle == pytest.approx(angle[rows], abs=0.2)
+    # On its way back it is sheared less at the same place, and pulls less.
+    assert (angle[:28] - angle[:28:-1])[10:20].min() > 2.0
+    assert (force[:28] - force[:28:-1])[10:20].min() > 0.05 * force.max()
+
+
+def test_a_way_back_has_a_curve_of_its_own():
+    """Half the moments on the same way make half of their force."""
+    both = replace(STIFF, back=Curve(tuple(m / 2.0 for m in STIFF.moments)))
+    path = solved_strip(case(back=True, steps=20), both)
+    D = np.linspace(1.0, 4.0, 7)
+    out, back = (PchipInterpolator(p.travel, p.force)(D) for p in (path, path.back))
+    # But for what the tows' bending makes of it.
+    assert back == pytest.approx(out / 2.0, rel=0.1)
+
+
+def test_a_way_out_is_had_without_the_way_back(monkeypatch):
+    def stops(model, case, corners, seen):
+        if case.unload:
+            raise SolveError("on the way back")
+        return original(model, case, corners, seen)
+
+    whole, original = solved_strip(case(), SOFT), strip.pulled
+    monkeypatch.setattr(strip, "pulled", stops)
+    assert same(solved_strip(case(back=True), SOFT), whole) and whole.back is None
 
 
 def test_processes_find_what_one_finds(monkeypatch):

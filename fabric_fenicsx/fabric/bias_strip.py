@@ -109,15 +109,23 @@ class BiasStrip:
             ValueError: the spacing is too large, or far too small.
         """
         angles = (90.0 + self.bias, self.bias)
-        # Weft tows lie beside each other along the warp, and the other way round.
-        extents = [float(np.ptp(self.outline.extent(axis))) for axis in self.tows]
+        extents = self._extents
         check_size((extents[0], spacings[0]), (extents[1], spacings[1]), subdivisions)
         families = []
-        for angle, extent, spacing in zip(angles, extents, spacings, strict=True):
-            count = max(round(extent / spacing), 1)
+        for angle, count, spacing in zip(angles, self.counts(spacings), spacings, strict=True):
             positions = spacing * (np.arange(count) - (count - 1) / 2.0)
             families.append(TowFamily(angle, tuple(positions)))
         return TowLayout(families[0], families[1], self.outline, subdivisions)
+
+    def counts(self, spacings: tuple[float, float]) -> list[int]:
+        """Numbers of warp and of weft tows at their spacings [mm]."""
+        pairs = zip(self._extents, spacings, strict=True)
+        return [max(round(extent / spacing), 1) for extent, spacing in pairs]
+
+    @property
+    def _extents(self) -> list[float]:
+        """Of the strip across its warp and across its weft [mm]."""
+        return [float(np.ptp(self.outline.extent(axis))) for axis in self.tows]
 
     def gripped(self, points: Floats) -> npt.NDArray[np.int64]:
         """How many of the two tows of a place end in a clamp: 0 in zone A, 1 in B, 2 in C, (n,).

@@ -111,14 +111,28 @@ class BiasExtensionCase(CrossheadCase):
 
     @model_validator(mode="after")
     def _has_a_middle(self) -> BiasExtensionCase:
-        a, b = self.warp_spacing_mm, self.weft_spacing_mm
-        cosine, sine = np.cos(np.radians(self.bias_deg)), np.sin(np.radians(self.bias_deg))
-        least = max((a + self.width_mm * cosine) / sine, (b + self.width_mm * sine) / cosine)
+        least = self._length_for(self.warp_spacing_mm, self.weft_spacing_mm)
         if self.length_mm < least:
             raise ValueError(
                 f"length_mm: at least {least:.5g}, so that two tows of each family end in no clamp"
             )
+        a, b = self.spacings
+        families = zip(self.strip.counts((a, b)), (a, b), self.strip.free, strict=True)
+        # The innermost tows lie in the middle or, where their number is even, half a spacing off.
+        if any(count % 2 == 0 and spacing > free / 2.0 for count, spacing, free in families):
+            raise ValueError(
+                f"length_mm: {self.length_mm:g}, allowed is at least "
+                f"{self._length_for(2.0 * a, 2.0 * b):.5g} where the strip is {self.width_mm:g} mm "
+                f"wide and tows are {max(a, b):.3g} mm apart (warp_spacing_mm, weft_spacing_mm): "
+                "no crossing would lie about its middle"
+            )
         return self
+
+    def _length_for(self, p: float, q: float) -> float:
+        """Length [mm] at which tows that end in no clamp take up so much; see BiasStrip.free."""
+        cosine, sine = np.cos(np.radians(self.bias_deg)), np.sin(np.radians(self.bias_deg))
+        needed = (p + self.width_mm * cosine) / sine, (q + self.width_mm * sine) / cosine
+        return float(max(needed))
 
     @property
     def spacings(self) -> tuple[float, float]:

@@ -84,6 +84,7 @@ class Effect:
         acts_on: of a term without a formula, what it is added to or a factor of; empty of an
             effect that has a name.
         depends_on: of such a term, what it is a function of.
+        general_form_of: of such a term, names of listed effects that it has as a special case.
     """
 
     name: str
@@ -93,6 +94,7 @@ class Effect:
     of_fabric: bool = True
     acts_on: str = ""
     depends_on: tuple[str, ...] = ()
+    general_form_of: tuple[str, ...] = ()
 
     @property
     def listed(self) -> bool:

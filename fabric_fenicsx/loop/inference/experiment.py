@@ -201,6 +201,11 @@ class Experiment(Protocol):
         ...
 
     @property
+    def terms_are_rivals(self) -> bool:
+        """Whether terms are looked for also beside a single candidate that will do, as rivals."""
+        ...
+
+    @property
     def notes(self) -> Sequence[str]:
         """What a reader of the report has to know of the model."""
         ...

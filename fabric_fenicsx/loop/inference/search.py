@@ -9,7 +9,8 @@ amplitudes must be significant, stretches that are left out must be predicted be
 with fewer effects, and what it leaves must be noise: else nothing is claimed.
 
 Where no effect with a name accounts for the fitted readings the same is done with terms without a
-formula beside them: what acts on what, and by what does it go?
+formula beside them: what acts on what, and by what does it go? Where one does, such terms may be
+its rivals.
 """
 
 from __future__ import annotations
@@ -77,6 +78,8 @@ def diagnose_test(
     if not search.accounted:
         return _beside(_Search(experiment, [*listed, *experiment.terms], progress).run(), found)
     if search.effects_needed < 2:
+        if experiment.terms_are_rivals and len(found.effects) == 1:
+            search.name_terms(found, progress)
         return found
     # Several effects with names may imitate a single one that has none.
     single = _Search(experiment, experiment.terms, progress, most=1)
@@ -534,19 +537,19 @@ class _Search:
                         self._weighed([(f, self._effects_of(f)) for f in fits])
                     )
                 best = min(known, key=lambda m: m.criterion, default=None)
-                near = best is not None and self._near(best, final, own)
+                near = best is not None and self._near(best, final, shapes=not own.listed)
                 if near or {own.name, other.name} <= self.experiment.alike:
                     found[own.name].append(other.name)
         return found
 
-    def _near(self, model: Model, final: Model, own: Effect) -> bool:
+    def _near(self, model: Model, final: Model, *, shapes: bool) -> bool:
         """Whether the data do not decide against a model with another effect in an effect's place.
 
         Shapes without a formula are not the law itself: where they leave as little, what they miss
         of it may outweigh what the readings say.
         """
         loses = model.criterion - final.criterion
-        if own.listed or loses > REFINED_WITHIN:
+        if not shapes or loses > REFINED_WITHIN:
             return loses < CRITERIA.decisive
         model = self._last(model)
         loses = model.criterion - final.criterion
@@ -571,6 +574,32 @@ class _Search:
             if all(forms):
                 found.append((own, forms[0], other, forms[1]))
         return found[: CRITERIA.pairs]
+
+    def name_terms(self, found: Diagnosis, progress: Callable[[float, str], None]) -> None:
+        """Name terms without a formula as rivals of a diagnosis' one listed effect.
+
+        Those that have it as a special case apart.
+        """
+        (own,) = found.effects
+        terms = [t for t in self.experiment.terms if own.name not in t.general_form_of]
+        other = _Search(self.experiment, terms, progress, most=1)
+        candidates, (_, *singles) = other._looked_through()
+        # Of the largest likelihood, as theirs.
+        self.judge.compared = True
+        final = self.judge.weighed(found.final, found.effects)
+        for candidate in (c for c in candidates if c.fit is not None):
+            model = next(m for m in singles[0] if m.effects == (candidate.effect,))
+            candidate.criterion = found.criterion_after + model.criterion - final.criterion
+            candidate.holdout = other.judge.holdout(model.fit)
+            found.candidates.append(candidate)
+            if other._near(model, final, shapes=True):
+                found.rivals[own.name].append(candidate.effect.name)
+                forms = [
+                    s._forms[frozenset({e})] for s, e in ((self, own), (other, candidate.effect))
+                ]
+                mine, its = (self._nearest_forms(fits) for fits in forms)
+                found.pairs.append((own.name, mine, candidate.effect.name, its))
+        del found.pairs[CRITERIA.pairs :]
 
     def _nearest_forms(self, fits: Sequence[Fit]) -> list[Fit]:
         """Those of some fits that leave about as little as the best of them."""

@@ -56,6 +56,7 @@ class CrossheadTest:
 
     quantity = "force_N"
     notes: Sequence[str] = ()
+    terms_are_rivals = False
     alike: frozenset[str] = frozenset()
     listed: ClassVar[tuple[Effect, ...]] = ()
     """The effects of this test."""

@@ -14,10 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ....errors import InputError
-from ....rigs.bias_extension import BiasExtensionCase, build, clamps, middle_zone
-from ....rigs.common import Session, control
+from ....rigs.bias_extension import BiasExtensionCase, build
+from ....rigs.common import Session
 from ....rigs.crosshead import crosshead, duration, turns
-from ....solving.stepping import Step, Stepper
 from ...inference.effects import Effect, Variant
 from ...measurement.case import measured_case
 from ...measurement.kind import MadeUp
@@ -26,6 +25,7 @@ from ..picture_frame.variant import FrameVariant
 from . import BiasExtensionRig
 from .model import BiasExtension
 from .quantities import ANGLE
+from .strip import pulled
 
 __all__ = ["made_up"]
 
@@ -92,9 +92,7 @@ def made_up(
 
     def solved(forms: Sequence[Variant], values: Mapping[str, float]) -> list[dict[str, Array]]:
         mine = [v for v in forms if isinstance(v, FrameVariant)]
-        read = [
-            _pulled(one, run, mine, values, place) for one, run in zip(cases, runs, strict=True)
-        ]
+        read = [_read(one, run, mine, values, place) for one, run in zip(cases, runs, strict=True)]
         # What acts on the load cell is the same in the first order.
         kept = [v for v in mine if v.reading is None]
         names = [p.name for p in (*experiment.baseline, *(p for v in kept for p in v.parameters))]
@@ -127,7 +125,7 @@ def _as_far(case: BiasExtensionCase, length: float, rate: float, place: str) -> 
     return measured_case(BiasExtensionCase, case.model_dump(), changes, place)
 
 
-def _pulled(
+def _read(
     case: BiasExtensionCase,
     run: Run,
     forms: Sequence[FrameVariant],
@@ -153,24 +151,9 @@ def _pulled(
         laws=tuple(partial(type(law).of_case, law.keys()) for law in laws),
     )
     model = build(case, session, _true_travel(case, forms, values, place))
-    upper, middle = clamps(model.net, case)[1], middle_zone(model.net, case)[0]
-    rows = [(0.0, 0.0, 0.0)]
-
-    def observe(one: Step) -> None:
-        force = float(model.reactions()[upper, 1].sum())
-        angle = float(model.snapshot(one.time).shear_angle[middle].mean())
-        rows.append((one.time, force, float(np.degrees(angle))))
-
-    newton = model.newton(
-        force_tolerance=case.solver.force_tolerance_N, limit=case.solver.iteration_limit
-    )
-    stepper = Stepper(model, newton, control(case.solver), observe=observe)
-    for corner in (*turns(case), duration(case)):
-        stepper.run(corner)
-        stepper.predictor.forget()
-    time, force, angle = np.array(rows).T
+    time, force, angle = pulled(model, case, (*turns(case), duration(case)))
     at = run.columns["time_s"]
-    return {"force_N": np.interp(at, time, force), ANGLE: np.interp(at, time, angle)}
+    return {"force_N": np.interp(at, time, force), ANGLE: np.interp(at, time, np.degrees(angle))}
 
 
 def _true_travel(

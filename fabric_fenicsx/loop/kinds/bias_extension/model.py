@@ -8,8 +8,9 @@ leaves them where they are to first order: with the forces F_a that were solved 
 
 is wrong by the square of m − m_a only, exactly right in its first derivatives, and as cheap as a
 picture frame of as many crossings. Where m has gone far from all curves that were solved for the
-strip is solved anew. Angles go by the travel alone, on the way back as on the way out. Crossings
-that go alike are taken together.
+strip is solved anew. A strip that goes back is solved on its way back as well, from the furthest
+that it got, with a curve of that way: on each of the two ways angles go by the travel alone.
+Crossings that go alike are taken together.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import PchipInterpolator
 
 from ....errors import SolveError
 from ....rigs.fabric_file import FabricFile
@@ -38,6 +38,7 @@ from ..records import shifted
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking_variant
 from .quantities import first_curve, read_together, strip_of
+from .settled import Correction, Quantity, correction
 from .solved import GROUPS, Part, Solved, SolvedStrips, Wanted, gamma_of, number, of_ways, reached
 from .strip import FINE_STEPS, KNOTS, Curve, strip_case
 from .terms import strip_terms
@@ -51,14 +52,14 @@ Flags = npt.NDArray[np.bool_]
 PACE = 1.5
 #: Points of the way on which a law with memory is followed to its curve.
 ALONG = 60
+#: Parameter of the baseline's dashpot.
+DASHPOT = "c1_N_s"
+#: Share of its travel that a strip must have been let back by: less is the noise of a record.
+GONE_BACK = 0.02
 #: Share by which a curve, a slip or a crimp may differ from those that a fit was solved with.
 SETTLED = 0.02
 #: Least work of moments, over that of the first curve, that strips slip at.
 LEAST_SIZE = 1e-6
-
-
-#: Of each run, what force [N] and angle [rad] were off by, of the travel.
-_Correction = tuple[tuple[PchipInterpolator, PchipInterpolator], ...]
 
 
 class BiasExtension(CrossheadTest):
@@ -68,6 +69,8 @@ class BiasExtension(CrossheadTest):
     listed = BIAS_EXTENSION_EFFECTS
     one_curve = None
     curves_only = False
+    # Each of its readings is of crossings at many angles: laws of other variables look more alike.
+    terms_are_rivals = True
 
     def __init__(
         self,
@@ -75,7 +78,7 @@ class BiasExtension(CrossheadTest):
         own: Sequence[Effect] = (),
         like: BiasExtension | None = None,
     ) -> None:
-        self._corrections: dict[frozenset[Variant], _Correction] = {}
+        self._corrections: dict[frozenset[Variant], Correction] = {}
         self._settled: dict[frozenset[Variant], tuple[Solved, dict[str, Any]]] = {}
         self._like = like
         #: What a law that nothing was fitted of foretells; see frame_law.foretold.
@@ -135,8 +138,10 @@ class BiasExtension(CrossheadTest):
     def _foretold(self, curve: Curve) -> dict[str, float]:
         """How forces with a curve that nothing was fitted of meet what was read."""
         solved = self._strips.solved({}, curve)
-        D = self._points["D"].value
-        force = np.stack([way.force(D[:, r], curve) for r, way in enumerate(solved.ways)], axis=1)
+        D, back = self._points["D"].value, self._back
+        force = np.stack(
+            [way.force(D[:, r], back[:, r], curve) for r, way in enumerate(solved.ways)], axis=1
+        )
         rows = self.readings.usable & self.readings.first
         expected, travel = (self._at_readings(values)[rows] for values in (force, D))
         furthest = self._furthest[self.readings.run[rows]]
@@ -159,6 +164,10 @@ class BiasExtension(CrossheadTest):
         same = [[other == own for other in kinds] for own in kinds]
         self._furthest = np.array([D.max(axis=0)[own].max() for own in same])
         self._speed = PACE**paces
+        self._back = _backward(D, self._points["D_rate"].value)
+        gone = np.max(np.where(self._back, self._furthest - D, 0.0), axis=0)
+        back = np.array([gone[own].max() for own in same]) > GONE_BACK * self._furthest
+        self._back &= back
         for (m, run), travel, pace in zip(runs, self._furthest, self._speed, strict=True):
             strip_case(m, run, float(travel), float(pace), {})
         # Of the curve that laws with memory and dashpots follow, the same throughout.
@@ -170,9 +179,12 @@ class BiasExtension(CrossheadTest):
         self._typical_rate = float(np.nanmedian(rates))
         like = self._like
         paths = {} if like is None else like._strips.paths
-        self._strips: SolvedStrips = SolvedStrips(runs, self._furthest, self._speed, paths)
+        self._strips: SolvedStrips = SolvedStrips(runs, self._furthest, self._speed, back, paths)
         suggested = first_curve(self._of_forces()) if like is None else like.curve
         first = self._strips.solved({}, suggested)
+        self._top = max(
+            float(way.gamma(D).max()) for way, D in zip(first.ways, self._furthest, strict=True)
+        )
         self._mixture = [Part(first, number(1.0))]
         self._reached = reached(first, self._furthest)
         self._reached /= float(self._reached @ first.curve.moments)
@@ -233,7 +245,7 @@ class BiasExtension(CrossheadTest):
             if isinstance(v, StripPullVariant) and v.changes is not None:
                 value = values[v.parameters[0].name]
                 changes |= v.changes(value) if value > 0.0 else {}
-        curve = Curve.through(self._moments(variants, values).value)
+        curve = self._curve(variants, values, self._moments(variants, values).value)
         if key in self._settled:
             known, with_these = self._settled[key]
             alike = changes.keys() == with_these.keys() and all(
@@ -253,22 +265,7 @@ class BiasExtension(CrossheadTest):
             return
         self._settled[key] = exact, changes
         self._mixture = self._mixed(variants, values)
-        D = np.linspace(0.0, self._furthest, ALONG)
-        gamma, slope = (gamma_of(self._mixture, D, order).value for order in (0, 1))
-        area = np.concatenate([way.area for way in exact.ways])
-        work = (area * slope * curve(gamma)).reshape(*D.shape, GROUPS).sum(axis=2)
-        force, middle = (
-            of_ways(self._mixture, Varying(D), name).value for name in ("rest", "middle")
-        )
-        self._corrections[key] = tuple(
-            (
-                PchipInterpolator(at, way.force(at, curve) - own_force),
-                PchipInterpolator(at, way.middle(at) - own_middle),
-            )
-            for way, at, own_force, own_middle in zip(
-                exact.ways, D.T, (force + work).T, middle.T, strict=True
-            )
-        )
+        self._corrections[key] = correction(exact, self._mixture, self._furthest)
 
     def _mixed(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[Part]:
         """What is known of the strips of a model, solved now where that is not enough.
@@ -277,7 +274,7 @@ class BiasExtension(CrossheadTest):
         small: strips that slip are solved with moments of one size.
         """
         moments = self._moments(variants, values)
-        curve = Curve.through(moments.value)
+        curve = self._curve(variants, values, moments.value)
         base, parts = number(1.0), list[tuple[Wanted, Varying, Varying]]()
         for v in variants:
             if not isinstance(v, StripPullVariant) or v.changes is None:
@@ -287,7 +284,7 @@ class BiasExtension(CrossheadTest):
             if v.per_force:
                 size = self._size(moments)
                 amplitude = amplitude * size
-                mine = Curve.through(moments.value / size.value)
+                mine = self._curve(variants, values, moments.value, float(size.value))
             at = float(amplitude.value)
             for node, weight, slope in zip(*hermite_weights(v.solved_at, at), strict=True):
                 part = number(weight, {p: slope * d for p, d in amplitude.slopes.items()})
@@ -303,32 +300,68 @@ class BiasExtension(CrossheadTest):
             for solved, (_, weight, size) in zip(sets, parts, strict=True)
         ]
 
+    def _curve(
+        self,
+        variants: Sequence[Variant],
+        values: Mapping[str, float],
+        moments: Array,
+        size: float = 1.0,
+    ) -> Curve:
+        """The curves of a model with some moments at KNOTS on its way out, over a size.
+
+        Of all but the baseline's dashpot, which strips are solved with as such.
+        """
+        dashpot = values[DASHPOT]
+        viscous, back = dashpot * self._typical_rate, None
+        if self._back.any():
+            back = (self._at_knots_back(variants, values) + viscous) / size
+        return Curve.through((moments - viscous) / size, dashpot / size, back)
+
     def _moments(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Varying:
-        """The moments of a model's laws; see _at_knots."""
-        laws = [v for v in variants if isinstance(v, FrameVariant) and v.laws is not None]
-        return self._at_knots([None, *laws], values)
+        """Moments of a model on one way out at the speed of the runs, at KNOTS."""
+        return self._at_knots(_laws(variants), values)
 
     def _at_knots(
         self, forms: Sequence[FrameVariant | None], values: Mapping[str, float]
     ) -> Varying:
-        """Moments on one way out at the speed of the runs, at KNOTS; None: the baseline's."""
-        gamma = np.linspace(0.0, np.radians(KNOTS[-1]), ALONG)[:, None]
-        rate = self._typical_rate
+        """The same of some forms; None: the baseline's."""
+        gamma = np.linspace(0.0, np.radians(KNOTS[-1]), ALONG)
+        found = self._along(forms, values, gamma)
+
+        def at_knots(along: Array) -> Array:
+            return np.interp(np.radians(KNOTS), gamma, along)
+
+        return Varying(at_knots(found.value), {p: at_knots(s) for p, s in found.slopes.items()})
+
+    def _at_knots_back(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
+        """The same on the way back from the largest angle; beyond that with its last slope."""
+        out = np.linspace(0.0, self._top, ALONG)
+        total = self._along(_laws(variants), values, np.concatenate([out, out[-2::-1]]))
+        moment, known = total.value[-1 : ALONG - 1 : -1], out[:-1]
+        slope = max(float(moment[-1] - moment[-2]) / float(out[1]), 0.0)
+        beyond = slope * np.maximum(np.radians(KNOTS) - known[-1], 0.0)
+        return np.interp(np.radians(KNOTS), known, moment) + beyond
+
+    def _along(
+        self, forms: Sequence[FrameVariant | None], values: Mapping[str, float], way: Array
+    ) -> Varying:
+        """Moments [N/mm] along angles [rad] at equal steps, (n,) each; None: the baseline's."""
+        gamma, rate = way[:, None], self._typical_rate
+        direction = np.sign(np.diff(gamma, axis=0, prepend=-1.0))
         known = {
             "gamma": Varying(gamma),
             "gamma_n": Varying(shifted(gamma)),
-            "rate": Varying(np.full_like(gamma, rate)),
-            "per_time": Varying(np.full_like(gamma, rate / float(gamma[1, 0]))),
+            "rate": Varying(rate * direction),
+            "per_time": Varying(np.full_like(gamma, rate / float(way[1]))),
         }
         total = number(0.0)
         for v in forms:
             total += self._moment(v, known, values)
 
-        def at_knots(along: Array) -> Array:
-            whole = np.broadcast_to(along, gamma.shape)[:, 0]
-            return np.interp(np.radians(KNOTS), gamma[:, 0], whole)
+        def whole(values: Array) -> Array:
+            return np.broadcast_to(values, gamma.shape)[:, 0]
 
-        return Varying(at_knots(total.value), {p: at_knots(s) for p, s in total.slopes.items()})
+        return Varying(whole(total.value), {p: whole(s) for p, s in total.slopes.items()})
 
     def _size(self, moments: Varying) -> Varying:
         """Work of moments at KNOTS, over that of the first strips' curve on the same way."""
@@ -351,7 +384,9 @@ class BiasExtension(CrossheadTest):
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]
         area = np.concatenate([way.area for way in self._mixture[0].solved.ways])
-        gamma, first, second = (gamma_of(self._mixture, D.value, order) for order in range(3))
+        gamma, first, second = (
+            gamma_of(self._mixture, D.value, self._back, order) for order in range(3)
+        )
 
         def each(values: Array) -> Array:
             """Of every run, at each of its groups."""
@@ -386,13 +421,15 @@ class BiasExtension(CrossheadTest):
     ) -> Varying:
         self._mixture = self._mixed(variants, values)
         whole = super()._force(travel, variants, values)
-        rest, middle = (of_ways(self._mixture, travel["D"], name) for name in ("rest", "middle"))
-        found = self._pull = whole + rest + self._correction(variants, travel, 0)
+        rest, middle = (
+            of_ways(self._mixture, travel["D"], self._back, name) for name in ("rest", "middle")
+        )
+        found = self._pull = whole + rest + self._correction(variants, travel, "force")
         if not self._angles.any():
             return found
         # Of runs of angles nothing else counts.
         degree = np.asarray(np.degrees(self._together.unit))
-        angles = (middle + self._correction(variants, travel, 1)) * Varying(degree)
+        angles = (middle + self._correction(variants, travel, "middle")) * Varying(degree)
         return Varying(
             np.where(self._angles, angles.value, found.value),
             {
@@ -405,22 +442,16 @@ class BiasExtension(CrossheadTest):
         """The force of the strip also where its angle is read."""
         return super()._known(self._pull)
 
-    def _correction(self, variants: Sequence[Variant], travel: Any, which: int) -> Varying:
+    def _correction(self, variants: Sequence[Variant], travel: Any, quantity: Quantity) -> Varying:
         """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
-        off, D = self._corrections.get(_solved_by(variants)), travel["D"]
-        if off is None:
-            return number(0.0)
-        at = np.clip(D.value, 0.0, self._furthest)
-        value, change = (
-            np.stack([own[which](at[:, r], k) for r, own in enumerate(off)], axis=1) for k in (0, 1)
-        )
-        return Varying(value, {p: change * slope for p, slope in D.slopes.items()})
+        off = self._corrections.get(_solved_by(variants))
+        return number(0.0) if off is None else off.at(quantity, travel["D"], self._back)
 
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
         """Mean shear angle of the middle zone at every reading [degrees], (n,)."""
         self._mixture = self._mixed(variants, values)
-        middle = of_ways(self._mixture, self._points["D"], "middle")
-        middle += self._correction(variants, self._points, 1)
+        middle = of_ways(self._mixture, self._points["D"], self._back, "middle")
+        middle += self._correction(variants, self._points, "middle")
         return self._at_readings(np.degrees(middle.value))
 
     @property
@@ -428,6 +459,18 @@ class BiasExtension(CrossheadTest):
         """What a report must say of the model."""
         strips, angles = self._strips, self._together.notes
         return [*strips.notes, *foretold_in_words(self.foretold), *angles, *strips.left_out]
+
+
+def _laws(variants: Sequence[Variant]) -> list[FrameVariant | None]:
+    """The baseline's laws and those of forms; see BiasExtension._along."""
+    own = [v for v in variants if isinstance(v, FrameVariant) and v.laws is not None]
+    return [None, *own]
+
+
+def _backward(D: Array, speed: Array) -> Flags:
+    """Where crossheads are on a way back: at rest, as before it, (n_points, n_runs)."""
+    last = np.maximum.accumulate(np.where(speed != 0.0, np.arange(len(D))[:, None], 0), axis=0)
+    return np.take_along_axis(speed, last, axis=0) < 0.0
 
 
 def _solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:

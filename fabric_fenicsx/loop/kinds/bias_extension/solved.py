@@ -1,15 +1,16 @@
 """The strips of all runs as they were solved, with one curve of their crossings after another.
 
-A set of strips goes with one curve m(γ) and, where tows slip or are crimped, with some changed keys
-of the case; forces with other curves follow to first order (see model). Whoever asks for a curve
-has the nearest that was solved with these keys, or that one where none is near. All that has to be
-solved for one model is solved at once, in several processes.
+A set of strips goes with one curve m(γ), on the way back with one of its own, and, where tows slip
+or are crimped, with some changed keys of the case; forces with other curves follow to first order
+(see model). Whoever asks for a curve has the nearest that was solved with these keys, or that one
+where none is near. All that has to be solved for one model is solved at once, in several processes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any
 
@@ -37,6 +38,7 @@ __all__ = [
 ]
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 #: Groups of crossings that go alike.
 GROUPS = 24
@@ -53,27 +55,38 @@ Wanted = tuple[Mapping[str, Any], Curve]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Way:
-    """One run's strip as it was solved, of the travel.
+    """One run's strip as it was solved on its way out, or back, of the travel.
 
     Attributes:
         area: of the groups of crossings [mm²], (GROUPS,).
         gamma: their angles [rad], (n, GROUPS) at n travels.
         rest: force that is not the work of the crossings' curve [N].
         middle: mean shear angle of the middle zone [rad].
+        speed: dD/dt [mm/s], negative on the way back.
+        back: the way back; None where it is taken to be the way out.
     """
 
     area: Array
     gamma: PchipInterpolator
     rest: PchipInterpolator
     middle: PchipInterpolator
+    speed: float
+    back: Way | None = None
 
-    def work(self, D: Array, curve: Curve) -> Array:
-        """A dγ/dD m(γ) of the groups at some travels [mm], (n, GROUPS)."""
-        return np.asarray(self.area * self.gamma(D, 1) * curve(self.gamma(D)))
+    def at(self, name: str, D: Array, back: Flags, order: int = 0) -> Array:
+        """Angles, rest or middle, or a derivative in D, at travels [mm] on either way, (n, ...)."""
+        found = np.asarray(getattr(self, name)(D, order))
+        if self.back is None or not back.any():
+            return found
+        flags = back.reshape(-1, *([1] * (found.ndim - 1)))
+        return np.where(flags, getattr(self.back, name)(D, order), found)
 
-    def force(self, D: Array, curve: Curve) -> Array:
+    def force(self, D: Array, back: Flags, curve: Curve) -> Array:
         """Force [N] of a strip that goes as it was solved, with a curve, at some travels, (n,)."""
-        return np.asarray(self.rest(D) + self.work(D, curve).sum(axis=1))
+        flags, slope = back[:, None], self.at("gamma", D, back, 1)
+        rate = slope * np.where(flags, -self.speed, self.speed)
+        work = self.area * slope * curve.at(self.at("gamma", D, back), rate, flags)
+        return np.asarray(self.at("rest", D, back) + work.sum(axis=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,28 +96,38 @@ class Solved:
     Attributes:
         curve: of their crossings.
         ways: of each run.
-        passed: angles of all groups at some travels of all runs [rad], (n,).
+        passed: angles of all groups at some travels of all runs, out and back [rad], (n,).
         weight: A dγ/dD there, (n,).
-        work: that times the curve's moments, (n,).
+        rate: dγ/dt there [rad/s], (n,).
+        back: whether on the way back, (n,).
+        work: the weight times the curve's moments, (n,).
     """
 
     curve: Curve
     ways: tuple[Way, ...]
     passed: Array
     weight: Array
+    rate: Array
+    back: Flags
     work: Array
 
     @classmethod
     def along(cls, curve: Curve, ways: Sequence[Way], furthest: Array) -> Solved:
         """The same, from the travels that the strips went to [mm], (n_runs,)."""
-        every = [(way, np.linspace(0.0, D, TRAVELS)) for way, D in zip(ways, furthest, strict=True)]
+        every = [(w, np.linspace(0.0, D, TRAVELS)) for w, D in zip(ways, furthest, strict=True)]
+        every += [(w.back, D) for w, D in every if w.back is not None]
         passed = np.concatenate([way.gamma(D).ravel() for way, D in every])
-        weight = np.concatenate([(way.area * way.gamma(D, 1)).ravel() for way, D in every])
-        return cls(curve, tuple(ways), passed, weight, weight * curve(passed))
+        weight, rate = (
+            np.concatenate([(by(way) * way.gamma(D, 1)).ravel() for way, D in every])
+            for by in (attrgetter("area"), attrgetter("speed"))
+        )
+        back = np.arange(len(passed)) >= TRAVELS * GROUPS * len(ways)
+        work = weight * curve.at(passed, rate, back)
+        return cls(curve, tuple(ways), passed, weight, rate, back, work)
 
     def apart(self, curve: Curve) -> float:
         """By how much of its work a curve differs from the one that strips were solved with."""
-        mine = self.weight * curve(self.passed)
+        mine = self.weight * curve.at(self.passed, self.rate, self.back)
         total = float(np.abs(mine).sum())
         return float(np.abs(mine - self.work).sum()) / max(total, 1e-300)
 
@@ -121,6 +144,7 @@ class SolvedStrips:
         runs: with their measurements.
         furthest: travel that each strip is solved up to [mm], (n_runs,).
         speed: at which [mm/s], (n_runs,).
+        back: whether it is let back as well, (n_runs,).
         paths: of strips that were solved before, by their case and curve; is added to.
 
     Attributes:
@@ -136,15 +160,17 @@ class SolvedStrips:
         runs: Sequence[tuple[Measurement, Run]],
         furthest: Array,
         speed: Array,
+        back: Flags,
         paths: dict[tuple[str, Curve], StripPath],
     ) -> None:
-        self._runs, self._furthest, self._speed = list(runs), furthest, speed
+        self._runs, self._furthest, self._strips = list(runs), furthest, (furthest, speed, back)
         self._groups: list[npt.NDArray[np.int64]] | None = None
         self._known: dict[str, list[Solved]] = {}
         self.paths = paths
         self.failed: dict[str, str] = {}
         self.surprises: list[float] = []
         self.count = 0
+        self._no_way_back = False
 
     @property
     def notes(self) -> list[str]:
@@ -158,6 +184,10 @@ class SolvedStrips:
             off = 100.0 * float(np.median(self.surprises))
             found.append(
                 f"That foretold the forces of the next strips to {off:.2g} % rms in the median."
+            )
+        if self._no_way_back:
+            found.append(
+                "Strips that stopped on their way back are taken to go as on their way out."
             )
         return found
 
@@ -176,8 +206,8 @@ class SolvedStrips:
         places = []
         for changes, curve in wanted:
             own = []
-            for (m, run), travel, pace in zip(self._runs, self._furthest, self._speed, strict=True):
-                case = strip_case(m, run, float(travel), float(pace), changes, steps)
+            for (m, run), travel, pace, back in zip(self._runs, *self._strips, strict=True):
+                case = strip_case(m, run, float(travel), float(pace), changes, steps, bool(back))
                 own.append((case.model_dump_json(), curve))
                 if own[-1] not in self.paths:
                     tasks.setdefault(own[-1], (case, curve))
@@ -186,7 +216,11 @@ class SolvedStrips:
         stopped: dict[tuple[str, Curve], Exception] = {}
         results = each_of(solved_strip, [tasks[key] for key in order])
         for key, path in zip(order, results, strict=True):
-            (stopped if isinstance(path, Exception) else self.paths)[key] = path
+            if isinstance(path, Exception):
+                stopped[key] = path
+            else:
+                self.paths[key] = path
+                self._no_way_back |= tasks[key][0].unload and path.back is None
         found = []
         for (changes, curve), own in zip(wanted, places, strict=True):
             one = self._gathered(curve, [stopped.get(key) or self.paths[key] for key in own])
@@ -247,9 +281,10 @@ class SolvedStrips:
         """By how much strips differ from what others had foretold of their curve."""
         off, size = [], []
         for new, old, furthest in zip(found.ways, before.ways, self._furthest, strict=True):
-            D = np.linspace(0.0, furthest, TRAVELS)[1:]
-            force = new.force(D, found.curve)
-            off.append(force - old.force(D, found.curve))
+            D = np.tile(np.linspace(0.0, furthest, TRAVELS)[1:], 2)
+            back = np.arange(len(D)) >= TRAVELS - 1
+            force = new.force(D, back, found.curve)
+            off.append(force - old.force(D, back, found.curve))
             size.append(force)
         return float(np.linalg.norm(np.concatenate(off)) / np.linalg.norm(np.concatenate(size)))
 
@@ -284,17 +319,17 @@ class Part:
     size: Varying = field(default_factory=lambda: number(1.0))
 
 
-def gamma_of(parts: Sequence[Part], D: Array, order: int) -> Varying:
+def gamma_of(parts: Sequence[Part], D: Array, back: Flags, order: int) -> Varying:
     """Angles of all groups, or derivatives in D (n_points, n_runs), (n_points, n_groups)."""
     total = number(0.0)
     for part in parts:
         ways = part.solved.ways
-        own = np.hstack([way.gamma(D[:, r], order) for r, way in enumerate(ways)])
+        own = np.hstack([w.at("gamma", D[:, r], back[:, r], order) for r, w in enumerate(ways)])
         total += part.weight * Varying(own)
     return total
 
 
-def of_ways(parts: Sequence[Part], D: Varying, name: str) -> Varying:
+def of_ways(parts: Sequence[Part], D: Varying, back: Flags, name: str) -> Varying:
     """What the ways of strips say, (n_points, n_runs): their rest, or the angle of the middle.
 
     The first goes with the size of the forces.
@@ -303,7 +338,7 @@ def of_ways(parts: Sequence[Part], D: Varying, name: str) -> Varying:
     for part in parts:
         value, change = (
             np.stack(
-                [getattr(w, name)(D.value[:, r], k) for r, w in enumerate(part.solved.ways)],
+                [w.at(name, D.value[:, r], back[:, r], k) for r, w in enumerate(part.solved.ways)],
                 axis=1,
             )
             for k in (0, 1)
@@ -328,16 +363,19 @@ def reached(solved: Solved, furthest: Array) -> Array:
 
 
 def _way(path: StripPath, group: npt.NDArray[np.int64], curve: Curve) -> Way:
-    """A path with its crossings in groups."""
+    """A path, and its way back, with its crossings in groups."""
     area = np.bincount(group, path.area, GROUPS).astype(np.float64)
     gamma = np.stack([np.bincount(group, path.area * row, GROUPS) / area for row in path.gamma])
     of_travel = PchipInterpolator(path.travel, gamma)
-    work = np.sum(area * of_travel(path.travel, 1) * curve(gamma), axis=1)
+    slope = of_travel(path.travel, 1)
+    work = np.sum(area * slope * curve(gamma, path.speed * slope), axis=1)
     return Way(
         area,
         of_travel,
         PchipInterpolator(path.travel, path.force - work),
         PchipInterpolator(path.travel, path.middle),
+        path.speed,
+        None if path.back is None else _way(path.back, group, curve.back or curve),
     )
 
 

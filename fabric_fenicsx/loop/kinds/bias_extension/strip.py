@@ -1,13 +1,13 @@
-"""A strip pulled out once by the finite elements: what its crossings did on the way.
+"""A strip pulled by the finite elements, out and where it is wanted back: what its crossings did.
 
 A law of the crossings without memory is known by its curve m(γ); any other goes through one such
-curve on the way out. The strip is solved with that curve, as a table, so that nothing is compiled
-for another law.
+curve on the way out and through another on the way back. The strip is solved with these curves, as
+tables, and a linear dashpot, so that nothing is compiled for another law.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from pathlib import Path
@@ -21,20 +21,23 @@ import numpy.typing as npt
 from scipy.interpolate import PPoly
 
 from ...._dolfinx import Function
-from ....errors import InputError
+from ....errors import InputError, SolveError
 from ....mechanics.laws.law import Crossing
 from ....mechanics.laws.tabulated import TabulatedSpring
 from ....rigs.bias_extension import BiasExtensionCase, build, clamps, middle_zone, slip_limit
 from ....rigs.cases import SolverKeys
 from ....rigs.common import Session, control
-from ....rigs.crosshead import duration
+from ....rigs.crosshead import crosshead, duration
+from ....solving.model import Model
+from ....solving.snapshot import Snapshot
 from ....solving.stepping import Step, Stepper
 from ...measurement.case import measured_case, tow_of
 from ...measurement.schema import FILE, Measurement, Run
 
-__all__ = ["KNOTS", "Curve", "StripPath", "solved_strip", "strip_case"]
+__all__ = ["KNOTS", "Curve", "StripPath", "pulled", "solved_strip", "strip_case"]
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 #: Angles [degrees] at which a curve is given; the last piece goes on straight.
 KNOTS = np.array([0.0, 3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 38.0, 44.0, 50.0, 56.0, 62.0, 70.0])
@@ -52,32 +55,49 @@ NOTHING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A moment per area m(γ) [N/mm] at KNOTS, monotone cubic in between, odd.
+    """A moment per area m(γ) + β γ̇ [N/mm], m by its values at KNOTS, monotone cubic between, odd.
 
     Attributes:
-        moments: at the knots, not falling, 0 at first.
+        moments: m at the knots, not falling, 0 at first.
+        dashpot: β [N s/mm].
+        back: the curve on the way back; None: the same.
     """
 
     moments: tuple[float, ...]
+    dashpot: float = 0.0
+    back: Curve | None = None
 
     @classmethod
-    def through(cls, moments: Array) -> Curve:
-        """The nearest that does not fall."""
+    def through(cls, moments: Array, dashpot: float = 0.0, back: Array | None = None) -> Curve:
+        """The nearest with m that does not fall, on the way back with another m.
+
+        Raises:
+            SolveError: a moment is not a number.
+        """
+        if not np.isfinite(moments).all():
+            raise SolveError("the moment of the crossings is not a number")
         rising = np.maximum.accumulate(np.maximum(moments, 0.0))
         least = LEAST_SLOPE * max(float(rising[-1]), NOTHING) * np.radians(KNOTS)
-        return cls((0.0, *(rising + least)[1:].tolist()))
+        on_the_way_back = None if back is None else cls.through(back, dashpot)
+        return cls((0.0, *(rising + least)[1:].tolist()), dashpot, on_the_way_back)
 
-    def __call__(self, gamma: Array) -> Array:
-        """At shear angles [rad]."""
-        return np.asarray(np.sign(gamma) * _cubics(self)(np.abs(gamma)))
+    def __call__(self, gamma: Array, rate: Array | float = 0.0) -> Array:
+        """At shear angles [rad] and rates [rad/s]."""
+        m = np.sign(gamma) * _cubics(self)(np.abs(gamma))
+        return np.asarray(m + self.dashpot * rate)
+
+    def at(self, gamma: Array, rate: Array, back: Flags) -> Array:
+        """The same on either way; flags as many, or one for several angles."""
+        out = self(gamma, rate)
+        return out if self.back is None else np.where(back, self.back(gamma, rate), out)
 
     @property
     def idle(self) -> bool:
         """Whether it does next to nothing."""
-        return self.moments[-1] <= NOTHING
+        return self.moments[-1] <= NOTHING and self.dashpot == 0.0
 
     def law(self, area: float) -> TabulatedSpring:
-        """Of a crossing that stands for an area [mm²]."""
+        """Of a crossing that stands for an area [mm²], the dashpot apart."""
         return TabulatedSpring(
             tuple(np.radians(KNOTS).tolist()), tuple(area * m for m in self.moments)
         )
@@ -92,14 +112,16 @@ def _cubics(curve: Curve) -> PPoly:
 
 @dataclass(frozen=True, slots=True)
 class StripPath:
-    """A strip on its way out.
+    """A strip on its way out, or back.
 
     Attributes:
-        travel: D [mm], increasing from 0, (n,).
+        travel: D [mm], increasing, (n,); out from 0.
         force: of the crosshead [N], (n,).
         gamma: shear angles that the crossings feel [rad], (n, n_crossings).
         middle: mean angle between the tows' axes in the middle zone [rad], (n,).
         area: of fabric that each crossing stands for [mm²], (n_crossings,).
+        speed: dD/dt [mm/s], negative on the way back.
+        back: its way back from there; None where it was not solved.
     """
 
     travel: Array
@@ -107,6 +129,8 @@ class StripPath:
     gamma: Array
     middle: Array
     area: Array
+    speed: float
+    back: StripPath | None = None
 
 
 def strip_case(
@@ -116,6 +140,7 @@ def strip_case(
     rate: float,
     changes: Mapping[str, Any],
     steps: int = STEPS,
+    back: bool = False,
 ) -> BiasExtensionCase:
     """The case of a run's way out, its crossings without a moment of their own.
 
@@ -126,6 +151,7 @@ def strip_case(
         rate: of the crosshead [mm/s].
         changes: other keys, by their dotted names.
         steps: of the way, if none fails.
+        back: whether it is let back to where it began.
 
     Raises:
         InputError: there can be no such strip.
@@ -145,7 +171,7 @@ def strip_case(
         "travel_mm": travel,
         "rate_mm_min": 60.0 * rate,
         "hold_s": 0.0,
-        "unload": False,
+        "unload": back,
         "tow": tow,
         "crossover": {"k1_N_mm": 0.0, "k3_N_mm": 0.0, "dashpot_N_s_mm": 0.0},
         "solver": {
@@ -158,12 +184,53 @@ def strip_case(
     return measured_case(BiasExtensionCase, keys, changes, place)
 
 
+def pulled(
+    model: Model,
+    case: BiasExtensionCase,
+    corners: Iterable[float],
+    seen: Callable[[Snapshot], None] = lambda snapshot: None,
+) -> tuple[Array, Array, Array]:
+    """Pull a strip from its rest on.
+
+    Args:
+        model: of the strip.
+        case: of it.
+        corners: times at which its motion changes, the end at last [s]; each is asked for when the
+            one before it has been reached.
+        seen: given each step's snapshot.
+
+    Returns:
+        Times [s], forces of the crosshead [N] and mean angles between the tows' axes in the middle
+        zone [rad], at rest and at each step, (n,) each.
+
+    Raises:
+        SolveError: it stopped before its end.
+    """
+    upper, middle = clamps(model.net, case)[1], middle_zone(model.net, case)[0]
+    rows = [(0.0, 0.0, 0.0)]
+
+    def observe(step: Step) -> None:
+        snapshot = model.snapshot(step.time)
+        seen(snapshot)
+        force = float(model.reactions()[upper, 1].sum())
+        rows.append((step.time, force, float(snapshot.shear_angle[middle].mean())))
+
+    keys = case.solver
+    newton = model.newton(force_tolerance=keys.force_tolerance_N, limit=keys.iteration_limit)
+    stepper = Stepper(model, newton, control(keys), observe=observe)
+    for corner in corners:
+        stepper.run(corner)
+        stepper.predictor.forget()
+    time, force, angle = np.array(rows).T
+    return time, force, angle
+
+
 def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:
-    """Pull a strip on this rank alone.
+    """Pull a strip on this rank alone, and let it back where the case says so.
 
     Raises:
         InputError: there is no such strip.
-        SolveError: it stopped before its end.
+        SolveError: it stopped on its way out.
     """
     crossover, tow = case.crossover, case.tow
     # What its forms do not depend on.
@@ -176,12 +243,19 @@ def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:
     }
     strip = _strip(case.model_copy(update=built).model_dump_json())
     strip.put_at_rest(case, curve)
-    return strip.pulled(case)
+    try:
+        return strip.pulled(case, curve)
+    except SolveError:
+        if not case.unload:
+            raise
+    # The way out may be had without the way back.
+    strip.put_at_rest(case, curve)
+    return strip.pulled(case.model_copy(update={"unload": False}), curve)
 
 
 @dataclass(frozen=True)
-class _Table(TabulatedSpring):
-    """A table of moments that is exchanged when its form has been compiled.
+class _Exchanged(TabulatedSpring):
+    """A table of moments and a dashpot that are exchanged when their form has been compiled.
 
     Attributes:
         constants: of the form.
@@ -190,21 +264,23 @@ class _Table(TabulatedSpring):
     constants: list[Any] = field(default_factory=list)
 
     def moment(self, at: Crossing) -> Any:
-        """As of any table."""
+        """That of the table and of the dashpot."""
 
         def number(value: Any) -> Any:
             self.constants.append(at.number(value))
             return self.constants[-1]
 
-        return super().moment(replace(at, number=number))
+        return super().moment(replace(at, number=number)) + number(0.0) * at.rate
 
     def energy(self, gamma: Any, memory: Mapping[str, Any], number: Callable[[Any], Any]) -> Any:
         """None: that of the first table is not that of the next."""
 
-    def exchange(self, table: TabulatedSpring) -> None:
-        """Take the moments of another table, at the same angles."""
-        for constant, values in zip(self.constants, table.numbers_of_cubics(), strict=True):
+    def exchange(self, curve: Curve, area: float) -> None:
+        """Take a curve for a crossing that stands for an area [mm²]."""
+        *table, dashpot = self.constants
+        for constant, values in zip(table, curve.law(area).numbers_of_cubics(), strict=True):
             constant.value[:] = values
+        dashpot.value = area * curve.dashpot
 
 
 @lru_cache(maxsize=KEPT)
@@ -221,11 +297,11 @@ class _Strip:
     """
 
     def __init__(self, case: BiasExtensionCase) -> None:
-        self._tables: list[_Table] = []
+        self._tables: list[_Exchanged] = []
 
-        def law(area: float) -> _Table:
+        def law(area: float) -> _Exchanged:
             table = Curve.through(KNOTS).law(area)
-            self._tables.append(_Table(table.angles, table.moments))
+            self._tables.append(_Exchanged(table.angles, table.moments))
             self._area = area
             return self._tables[-1]
 
@@ -246,40 +322,43 @@ class _Strip:
         for f, values in self._rest:
             f.x.array[:] = values
         model.histories.load(self._memories)
-        for table in self._tables:
-            table.exchange(curve.law(self._area))
+        self._take(curve)
         crossings = model.crossings
         if crossings is not None and crossings.slip_limit is not None:
             crossings.slip_limit.value = slip_limit(case)
         if model.crimp_strain is not None:
             model.crimp_strain.value = case.tow.crimp_strain
 
-    def pulled(self, case: BiasExtensionCase) -> StripPath:
-        """Pull it."""
+    def _take(self, curve: Curve) -> None:
+        for table in self._tables:
+            table.exchange(curve, self._area)
+
+    def pulled(self, case: BiasExtensionCase, curve: Curve) -> StripPath:
+        """Pull it, and let it back with the curve of that way."""
         model = self._model
-        net = model.net
-        places, spacings = net.points[net.crossings[:, 0]], case.spacings
-        upper = clamps(net, case)[1]
-        middle = middle_zone(net, case)[0]
-        travels, forces, means, angles = [0.0], [0.0], [0.0], [np.zeros(len(places))]
+        places, spacings = model.net.points[model.net.crossings[:, 0]], case.spacings
+        area = case.strip.shares(places, spacings) * spacings[0] * spacings[1]
+        # What the springs feel is the directors' turn, what a camera sees the axes' angle.
+        angles = [np.zeros(len(places))]
+        out, end = 60.0 * case.travel_mm / case.rate_mm_min, duration(case)
 
-        def observe(step: Step) -> None:
-            travels.append(case.rate_mm_min / 60.0 * step.time)
-            forces.append(float(model.reactions()[upper, 1].sum()))
-            snapshot = model.snapshot(step.time)
-            # What the springs feel is the directors' turn, what a camera sees the axes' angle.
-            angles.append(snapshot.director_turn)
-            means.append(float(snapshot.shear_angle[middle].mean()))
+        def corners() -> Iterator[float]:
+            yield out
+            if case.unload:
+                self._take(curve.back or curve)
+                yield end
 
-        solver = case.solver
-        newton = model.newton(
-            force_tolerance=solver.force_tolerance_N, limit=solver.iteration_limit
+        time, force, middle = pulled(
+            model, case, corners(), lambda snapshot: angles.append(snapshot.director_turn)
         )
-        Stepper(model, newton, control(solver), observe=observe).run(duration(case))
-        return StripPath(
-            np.array(travels),
-            np.array(forces),
-            np.array(angles),
-            np.array(means),
-            case.strip.shares(places, spacings) * spacings[0] * spacings[1],
-        )
+        travel = np.array([crosshead(case, t) for t in time])
+        gamma, turn = np.array(angles), int(np.argmin(np.abs(time - out))) + 1
+
+        speed = case.rate_mm_min / 60.0
+
+        def path(rows: slice, *more: Any) -> StripPath:
+            return StripPath(travel[rows], force[rows], gamma[rows], middle[rows], area, *more)
+
+        # Of the turn itself the way back has no force: the moments have just changed.
+        back = path(slice(None, turn - 1, -1), -speed) if case.unload else None
+        return path(slice(turn), speed, back)

@@ -108,6 +108,7 @@ class Cantilever:
     notes = ()
     one_curve = None
     curves_only = False
+    terms_are_rivals = False
     alike: frozenset[str] = frozenset()
 
     def __init__(

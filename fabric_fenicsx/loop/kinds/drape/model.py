@@ -91,6 +91,7 @@ class Drape:
     baseline: tuple[Parameter, ...] = ()
     one_curve = None
     curves_only = False
+    terms_are_rivals = False
     alike: frozenset[str] = frozenset()
     terms = ()
 
