@@ -1,0 +1,248 @@
+"""Models of a test: fitted, weighed, and fitted again with their own noise and scatter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...errors import SolveError
+from .criteria import CRITERIA
+from .effects import Effect, Variant
+from .experiment import Experiment
+from .fitting import Fit, fit, parameters_of
+from .judge import Judge, Model
+from .noise import Noise, estimated_noise
+from .starts import SMALL, Combination, fit_combinations
+from .variances import Variances
+
+__all__ = ["REFINED_WITHIN", "Models"]
+
+#: Scatter of specimens, as a share, that first fits allow for.
+FIRST_SCATTER = 0.1
+#: ... and where they are taken to be all but alike.
+ALIKE = 0.01
+#: Forms whose own variances are looked for, beside the best ones of each set of effects.
+MOST_NEAR, OF_A_SET = 6, 2
+#: Models whose parameters are fitted again with their own variances ...
+REFINED = 3
+#: ... if their criterion is within this of the best.
+REFINED_WITHIN = 60.0
+
+
+class Models:
+    """Fits and weighs models of a test.
+
+    Args:
+        experiment: the test.
+        effects: that may be in a model.
+
+    Attributes:
+        judge: that weighs them.
+        variances: what readings and specimens scatter by, as far as it is known now.
+        base: the fitted baseline that effects are added to.
+        forms: fits by the effects in them.
+    """
+
+    def __init__(self, experiment: Experiment, effects: Sequence[Effect]) -> None:
+        self.experiment, self.effects = experiment, list(effects)
+        self.judge = Judge(experiment, self.effects)
+        self.forms: dict[frozenset[Effect], list[Fit]] = {}
+        self.start = {p.name: p.starts[0] for p in experiment.baseline}
+        self.variances = self._first_variances()
+        fitted = self.baseline(self.start)
+        self.judge.leave_out(fitted)
+        self.base = self.baseline(fitted.values)
+        self.take_noise_from(self.base)
+
+    def _first_variances(self) -> Variances:
+        """White noise as it is given, or as neighbouring readings differ from a first fit."""
+        readings, rows = self.experiment.readings, self.judge.rows
+        floor = self.judge.given
+        if floor is None:
+            first = fit(self.experiment, (), self.start, rows, Variances(Noise(1.0)))
+            floor = estimated_noise(first.residual, readings, rows)
+            if not floor > 0.0:
+                floor = 1e-6 * float(abs(readings.observed[rows]).max(initial=1e-6))
+        scatter = {p.name: FIRST_SCATTER for p in self.experiment.baseline}
+        return Variances(Noise(floor), scatter)
+
+    def baseline(self, start: dict[str, float]) -> Fit:
+        """The baseline, fitted with the variances as they are now.
+
+        Raises:
+            SolveError: there are fewer readings than parameters, or it has no solution.
+        """
+        rows = self.judge.rows
+        if rows.sum() <= len(self.experiment.baseline):
+            readings = self.experiment.readings
+            unknown = int((~readings.usable & ~readings.holdout).sum())
+            raise SolveError(
+                f"the baseline has {len(self.experiment.baseline)} parameters and there are "
+                f"{int(rows.sum())} readings to fit"
+                + (f"; at {unknown} others the rate of the motion is not known" if unknown else "")
+            )
+        return fit(self.experiment, (), start, rows, self.variances)
+
+    def take_noise_from(self, fitted: Fit) -> None:
+        """Take noise and scatter from a model with a smooth line for what it misses."""
+        found = self.judge.components(fitted, smooth=True).variances
+        scatter = {g: max(tau, FIRST_SCATTER) for g, tau in found.scatter.items()}
+        self.variances = Variances(found.noise, scatter)
+
+    def with_these_variances(self, model: Model) -> Fit:
+        """A model fitted with the variances as they are now."""
+        return fit(
+            self.experiment,
+            model.fit.variants,
+            model.fit.values,
+            model.fit.used,
+            self.variances,
+            robust=CRITERIA.far,
+        )
+
+    def fitted(
+        self,
+        combinations: Sequence[Combination],
+        starts: int,
+        base: Fit | None = None,
+        most: int | None = None,
+    ) -> list[Fit]:
+        """Models with combinations of forms, by default added to the baseline.
+
+        See fit_combinations.
+        """
+        found = fit_combinations(
+            self.experiment,
+            base or self.base,
+            combinations,
+            self.variances,
+            starts=starts,
+            most=most,
+            robust=CRITERIA.far,
+        )
+        for model in found:
+            effects = frozenset(self.effects_of(model))
+            self.forms.setdefault(effects, []).append(model)
+        return found
+
+    def with_alike_specimens(self, combinations: Sequence[Combination]) -> list[Fit]:
+        """Forms of an effect with specimens that hardly differ.
+
+        What the baseline takes for their differences, where these are more than usual, may be all
+        that there is of an effect; a fit that allows for them as they were does not get there.
+        """
+        if max(self.variances.scatter.values(), default=0.0) <= FIRST_SCATTER:
+            return []
+        allowed = self.variances
+        self.variances = Variances(allowed.noise, dict.fromkeys(allowed.scatter, ALIKE))
+        try:
+            return self.fitted(combinations, starts=1)
+        finally:
+            self.variances = allowed
+
+    def effects_of(self, model: Fit) -> tuple[Effect, ...]:
+        """Effects of a fitted model, in the order of its forms."""
+        return tuple(self.effect_of(v) for v in model.variants)
+
+    def effect_of(self, variant: Variant) -> Effect:
+        """The effect that a form is one of."""
+        return next(e for e in self.effects if variant in e.variants)
+
+    def weighed(self, found: Sequence[Fit]) -> list[Model]:
+        """Models with their criteria, the best first.
+
+        Of each set of effects the forms that are best at first sight, with variances that are not
+        their own, and all forms that come near the best of all.
+        """
+        effects = [self.effects_of(model) for model in found]
+        first = [
+            f.size(CRITERIA.far) + self.judge.cost(f, own)
+            for f, own in zip(found, effects, strict=True)
+        ]
+        # A form of which nothing is left says nothing of its effect.
+        order = sorted(range(len(found)), key=lambda k: (_nothing_left(found[k]), first[k]))
+        seen: list[frozenset[Effect]] = []
+        models = []
+        for rank, k in enumerate(order):
+            near = rank < MOST_NEAR and first[k] < first[order[0]] + CRITERIA.decisive
+            if near or seen.count(frozenset(effects[k])) < OF_A_SET:
+                seen.append(frozenset(effects[k]))
+                models.append(self.judge.weighed(found[k], effects[k]))
+        return sorted(models, key=lambda m: m.criterion)
+
+    def refined(self, model: Model) -> Model:
+        """A model fitted again with its own noise and scatter; the old one if there is none."""
+        for last in (False, True):
+            variances = self.judge.averaged(model) if last else model.estimate.variances
+            try:
+                if not last:
+                    self.experiment.settle(model.fit.variants, model.fit.values)
+                model = self._again(model, variances, CRITERIA.evaluations)
+            except SolveError:
+                return model
+        return model
+
+    def _again(self, model: Model, variances: Variances, evaluations: int) -> Model:
+        """A model fitted again from where it is, with other variances."""
+        found = fit(
+            self.experiment,
+            model.fit.variants,
+            model.fit.values,
+            model.fit.used,
+            variances,
+            deviations=model.fit.deviations,
+            evaluations=evaluations,
+        )
+        return self.judge.weighed(found, model.effects)
+
+    def last(self, model: Model) -> Model:
+        """A model fitted to the end; the old one where there is no solution on the way."""
+        try:
+            self.experiment.settle(model.fit.variants, model.fit.values)
+            return self._again(model, self.judge.averaged(model), CRITERIA.final_evaluations)
+        except SolveError:
+            return model
+
+    def best_refined(self, models: list[Model]) -> list[Model]:
+        """Models, the best first; the best of each set of effects was fitted again.
+
+        A model is only compared as the best when its parameters go with its own variances.
+        """
+        refined: list[Model] = []
+        rest = sorted(models, key=lambda m: m.criterion)
+        while rest:
+            best = min((m.criterion for m in refined), default=float("inf"))
+            if len(refined) >= REFINED and rest[0].criterion >= best:
+                break
+            if rest[0].criterion > best + REFINED_WITHIN or len(refined) >= 2 * REFINED:
+                break
+            model = self.refined(rest.pop(0))
+            # Another start that leads to the same place.
+            same = [m for m in rest if m.fit.variants == model.fit.variants]
+            rest = [m for m in rest if m not in same or m.criterion < model.criterion - 1.0]
+            refined.append(model)
+        return sorted(refined, key=lambda m: m.criterion) + rest
+
+    def by_strength(self, model: Model) -> tuple[Effect, ...]:
+        """Effects of a model, that first which changes the expected readings most."""
+
+        def change(effect: Effect) -> float:
+            kept = [v for v in model.fit.variants if v not in effect.variants]
+            names = {p.name for p in parameters_of(self.experiment, kept)}
+            values = {name: value for name, value in model.fit.values.items() if name in names}
+            without, _ = self.experiment.predict(kept, values)
+            alike, _ = self.experiment.predict(model.fit.variants, model.fit.values)
+            return float(np.sum((alike - without)[model.fit.used] ** 2))
+
+        if len(model.effects) < 2:
+            return model.effects
+        return tuple(sorted(model.effects, key=change, reverse=True))
+
+
+def _nothing_left(model: Fit) -> bool:
+    """Whether some effect of a model has all its amplitudes on a bound at nothing."""
+    return any(
+        all(p.name in model.at_bound and abs(model.values[p.name]) <= SMALL for p in v.amplitudes)
+        for v in model.variants
+    )

@@ -1,0 +1,99 @@
+"""Effects that the readings do not tell from those that were found, and pairs of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from .criteria import CRITERIA
+from .diagnosis import Pair
+from .fitting import Fit
+from .judge import Model
+from .models import REFINED_WITHIN, Models
+from .screen import Screen
+
+__all__ = ["near", "nearest_forms", "pairs_of", "rivals_of"]
+
+
+def rivals_of(
+    models: Models,
+    screened: Callable[[], Screen],
+    final: Model,
+    levels: Sequence[Sequence[Model]],
+) -> dict[str, list[str]]:
+    """For each effect of a model, the others that could take its place in it.
+
+    Args:
+        models: of the test.
+        screened: all effects to first order.
+        final: the model.
+        levels: models that are known, by their number of effects.
+    """
+    found: dict[str, list[str]] = {}
+    for own in final.effects:
+        kept = [e for e in final.effects if e is not own]
+        found[own.name] = []
+        for other in (e for e in models.effects if e not in final.effects):
+            known = [m for m in levels[len(final.effects)] if set(m.effects) == {other, *kept}]
+            if kept and not known:
+                forms = [v for v in final.fit.variants if models.effect_of(v) is not own]
+                fits = models.fitted(screened().instead(forms, other), starts=1)
+                known = models.best_refined(models.weighed(fits))
+            best = min(known, key=lambda m: m.criterion, default=None)
+            like = best is not None and near(models, best, final, shapes=not own.listed)
+            if like or {own.name, other.name} <= models.experiment.alike:
+                found[own.name].append(other.name)
+    return found
+
+
+def near(models: Models, model: Model, final: Model, *, shapes: bool) -> bool:
+    """Whether the data do not decide against a model with another effect in an effect's place.
+
+    Args:
+        models: that the first is one of.
+        model: with the other effect.
+        final: with the effect.
+        shapes: whether one of them has no formula. It is not the law itself then: where the two
+            leave as little, what it misses of the law may outweigh what the readings say.
+    """
+    loses = model.criterion - final.criterion
+    if not shapes or loses > REFINED_WITHIN:
+        return loses < CRITERIA.decisive
+    model = models.last(model)
+    loses = model.criterion - final.criterion
+    mine, other = (m.fit.rms(m.fit.used) for m in (final, model))
+    alike = other < CRITERIA.as_little * mine
+    return loses < CRITERIA.decisive * (CRITERIA.without_formula if alike else 1.0)
+
+
+def pairs_of(
+    models: Models,
+    final: Model,
+    rivals: Mapping[str, Sequence[str]],
+    of_the_curve: Sequence[str],
+) -> list[Pair]:
+    """Effects that are not told apart, each with all models that fit about as well.
+
+    Args:
+        models: of the test.
+        final: the model that was found.
+        rivals: of its effects.
+        of_the_curve: effects that come as near to a curve that nothing was found in.
+    """
+    by_name = {e.name: e for e in models.effects}
+    pairs = [(own, other) for own, others in rivals.items() for other in others]
+    pairs += [(of_the_curve[0], other) for other in of_the_curve[1:]]
+    found = []
+    for own, other in pairs:
+        kept = frozenset(e for e in final.effects if e.name != own)
+        forms = [
+            nearest_forms(models.forms.get(kept | {by_name[name]}, [])) for name in (own, other)
+        ]
+        if all(forms):
+            found.append((own, forms[0], other, forms[1]))
+    return found[: CRITERIA.pairs]
+
+
+def nearest_forms(fits: Sequence[Fit]) -> list[Fit]:
+    """Those of some fits that leave about as little as the best of them."""
+    least = min((f.sum_of_squares for f in fits), default=0.0)
+    return [f for f in fits if f.sum_of_squares < least + CRITERIA.decisive]
