@@ -325,6 +325,10 @@ def test_goes_on_where_it_stopped(tmp_path):
             "length_mm: 30, allowed is at least 33.333 where the strip is 20 mm wide and tows are "
             "4.71 mm apart (warp_spacing_mm, weft_spacing_mm): no crossing would lie about its",
         ),
+        (
+            "width_mm: 20\nwarp_spacing_mm: 40\nweft_spacing_mm: 40",
+            "width_mm: 20, allowed is at least 28.3 with tows 40 mm apart (warp_spacing_mm, ",
+        ),
         ("bias_deg: 90", "bias_deg: 90, allowed is a number greater than 0"),
         ("warp_spacing_mm: 1.0e-5", "at most 4000000 are allowed"),
         ("slip: 1", "slip: unknown key"),

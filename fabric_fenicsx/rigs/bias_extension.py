@@ -117,6 +117,12 @@ class BiasExtensionCase(CrossheadCase):
                 f"length_mm: at least {least:.5g}, so that two tows of each family end in no clamp"
             )
         a, b = self.spacings
+        if a < self.warp_spacing_mm / 2.0:
+            raise ValueError(
+                f"width_mm: {self.width_mm:g}, allowed is at least "
+                f"{self.warp_spacing_mm / np.sqrt(2.0):.3g} with tows {self.warp_spacing_mm:g} mm "
+                "apart (warp_spacing_mm, weft_spacing_mm): no mesh fits between the edges"
+            )
         families = zip(self.strip.counts((a, b)), (a, b), self.strip.free, strict=True)
         # The innermost tows lie in the middle or, where their number is even, half a spacing off.
         if any(count % 2 == 0 and spacing > free / 2.0 for count, spacing, free in families):

@@ -202,7 +202,7 @@ class Experiment(Protocol):
 
     @property
     def terms_are_rivals(self) -> bool:
-        """Whether terms are looked for also beside a single candidate that will do, as rivals."""
+        """Whether terms are tried also where a single candidate will do: they may be its rivals."""
         ...
 
     @property

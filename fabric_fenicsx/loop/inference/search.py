@@ -9,8 +9,8 @@ amplitudes must be significant, stretches that are left out must be predicted be
 with fewer effects, and what it leaves must be noise: else nothing is claimed.
 
 Where no effect with a name accounts for the fitted readings the same is done with terms without a
-formula beside them: what acts on what, and by what does it go? Where one does, such terms may be
-its rivals.
+formula beside them: what acts on what, and by what does it go? Where a single one does, such terms
+may be its rivals (see Experiment.terms_are_rivals).
 """
 
 from __future__ import annotations
@@ -63,20 +63,29 @@ def diagnose_test(
         return found
     if not search.accounted:
         return _beside(_Search(experiment, [*listed, *experiment.terms], progress).run(), found)
-    if search.effects_needed < 2:
-        if experiment.terms_are_rivals and len(found.effects) == 1:
-            search.name_terms(found, progress)
+    if search.effects_needed > 1:
+        # Several effects with names may imitate a single one that has none.
+        terms, least = list(experiment.terms), -CRITERIA.decisive
+    elif experiment.terms_are_rivals and found.effects:
+        (own,) = found.effects
+        terms = [t for t in experiment.terms if own.name not in t.general_form_of]
+        least = CRITERIA.decisive
+    else:
         return found
-    # Several effects with names may imitate a single one that has none.
-    single = _Search(experiment, experiment.terms, progress, most=1)
+    single = _Search(experiment, terms, progress, most=1)
     other = single.run()
     search.judge.compared = True
-    gain = search.judge.weighed(found.final, found.effects).criterion - other.criterion_after
-    if single.accounted and single.effects_needed == 1 and gain > -CRITERIA.decisive:
+    final = search.judge.weighed(found.final, found.effects)
+    gain = final.criterion - other.criterion_after
+    if single.accounted and single.effects_needed == 1 and gain > least:
         if gain < CRITERIA.decisive:
             for names_of in other.rivals.values():
                 names_of += [effect.name for effect in found.effects]
+        elif search.effects_needed == 1:
+            single.name(other, other.effects[0], search, found.effects[0])
         return _beside(other, found)
+    if search.effects_needed == 1:
+        search.name_terms(found, final, single, other)
     return found
 
 
@@ -111,6 +120,8 @@ class _Search:
         self.accounted = False
         #: How many effects it has.
         self.effects_needed = 0
+        #: Models of one effect, the best first.
+        self.singles: Sequence[Model] = ()
 
     # Search -------------------------------------------------------------------------------
 
@@ -125,6 +136,7 @@ class _Search:
             self.models.take_noise_from(nearest.fit)
             candidates, levels = self._looked_through()
         baseline = levels[0][0]
+        self.singles = levels[1] if len(levels) > 1 else ()
         chosen = self._chosen(levels)
         verdict = self._verdict(baseline, chosen)
         self.accounted = self.judge.accounts(chosen, baseline)
@@ -278,29 +290,31 @@ class _Search:
         new = [f for f in found if f.variants not in tried]
         levels[-2] = self.models.best_refined([*levels[-2], *self.models.weighed(new)])
 
-    def name_terms(self, found: Diagnosis, progress: Callable[[float, str], None]) -> None:
+    def name_terms(self, found: Diagnosis, final: Model, single: _Search, other: Diagnosis) -> None:
         """Name terms without a formula as rivals of a diagnosis' one listed effect.
 
-        Those that have it as a special case apart.
+        Args:
+            found: the diagnosis.
+            final: its model, weighed as terms are.
+            single: the search for one of them.
+            other: what that found.
         """
         (own,) = found.effects
-        terms = [t for t in self.experiment.terms if own.name not in t.general_form_of]
-        other = _Search(self.experiment, terms, progress, most=1)
-        candidates, (_, *singles) = other._looked_through()
-        # Of the largest likelihood, as theirs.
-        self.judge.compared = True
-        final = self.judge.weighed(found.final, found.effects)
-        for candidate in (c for c in candidates if c.fit is not None):
-            model = next(m for m in singles[0] if m.effects == (candidate.effect,))
+        for candidate in (c for c in other.candidates if c.fit is not None):
+            model = next(m for m in single.singles if m.effects == (candidate.effect,))
+            # In the table all are compared with the listed effect's own.
             candidate.criterion = found.criterion_after + model.criterion - final.criterion
-            candidate.holdout = other.judge.holdout(model.fit)
             found.candidates.append(candidate)
-            if near(other.models, model, final, shapes=True):
-                found.rivals[own.name].append(candidate.effect.name)
-                mine = nearest_forms(self.models.forms[frozenset({own})])
-                its = nearest_forms(other.models.forms[frozenset({candidate.effect})])
-                found.pairs.append((own.name, mine, candidate.effect.name, its))
-        del found.pairs[CRITERIA.pairs :]
+            if near(single.models, model, final, shapes=True):
+                self.name(found, own, single, candidate.effect)
+
+    def name(self, found: Diagnosis, own: Effect, search: _Search, rival: Effect) -> None:
+        """Name what another search has found as a rival of an effect of this one."""
+        found.rivals[own.name].append(rival.name)
+        if len(found.pairs) < CRITERIA.pairs:
+            mine = nearest_forms(self.models.forms[frozenset({own})])
+            its = nearest_forms(search.models.forms[frozenset({rival})])
+            found.pairs.append((own.name, mine, rival.name, its))
 
     # Choice -------------------------------------------------------------------------------
 

@@ -201,6 +201,7 @@ def reasons(report: Mapping[str, Any]) -> list[str]:
     chosen = [effect["name"] for effect in report["effects"]]
     chosen += [effect["name"] for effect in report["beside"]]
     chosen += [term["of"] for term in report["discovered"]]
+    rivals = [name for effect in report["effects"] for name in effect["rivals"]]
     found = []
     for c in (c for c in tried if c["name"] not in chosen):
         smaller = [
@@ -211,7 +212,12 @@ def reasons(report: Mapping[str, Any]) -> list[str]:
             and c[f"error_{kind}"] < (1.0 - SMALLER) * mine
         ]
         if smaller:
-            found.append(_weighed(c, ", ".join(smaller), c["criterion"] - own))
+            loses = c["criterion"] - own
+            if c["name"] in rivals and loses < 0.0:
+                what = f"{c['name']} has a smaller error ({', '.join(smaller)})"
+                found.append(f"{what}; the data do not decide between the two.")
+            else:
+                found.append(_weighed(c, ", ".join(smaller), loses))
     return found
 
 

@@ -93,7 +93,9 @@ class BiasExtension(CrossheadTest):
     def terms(self) -> list[Effect]:
         """Terms without a formula over what the fitted readings reached; none without forces."""
         forces = self.readings.fit & self.readings.first
-        return strip_terms(self._ranges()) if forces.any() else []
+        if not forces.any():
+            return []
+        return strip_terms(self._ranges(), goes_back=bool(self._back.any()))
 
     @cached_property
     def alike(self) -> frozenset[str]:  # type: ignore[override]

@@ -18,6 +18,8 @@ GENERAL_FORMS = {
     "elastic_moment_of_history": "crossover_relaxation",
     "viscous_moment_of_history": "crossover_relaxation",
     "odd_moment_of_angle": "shear_locking",
+    # A moment by the angle is a reading by the displacement.
+    "reading_of_displacement": "shear_locking",
     "odd_in_rate_moment": "rate_hardening",
     "viscous_moment_of_rate": "rate_hardening",
     "travel_of_displacement": "clamp_slip",
@@ -25,19 +27,27 @@ GENERAL_FORMS = {
 }
 """Listed effects that are terms with a formula, by what the names of the terms begin with."""
 
+OF_ONE_WAY = {
+    "elastic_moment_of_largest_angle": "shear_locking",
+    "elastic_moment_of_path": "shear_locking",
+}
+"""... and those of strips that never go back, along which the path is the angle."""
 
-def strip_terms(ranges: Mapping[str, float]) -> list[Effect]:
+
+def strip_terms(ranges: Mapping[str, float], *, goes_back: bool = True) -> list[Effect]:
     """The terms of a strip.
 
     Args:
         ranges: see picture_frame.terms.
+        goes_back: whether some strip does.
     """
+    general = GENERAL_FORMS if goes_back else GENERAL_FORMS | OF_ONE_WAY
     return [
         replace(
             term,
             test="bias_extension",
             general_form_of=tuple(
-                effect for name, effect in GENERAL_FORMS.items() if term.name.startswith(name)
+                effect for name, effect in general.items() if term.name.startswith(name)
             ),
         )
         for term in terms(ranges)
