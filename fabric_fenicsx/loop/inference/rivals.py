@@ -19,6 +19,7 @@ def rivals_of(
     screened: Callable[[], Screen],
     final: Model,
     levels: Sequence[Sequence[Model]],
+    most: int,
 ) -> dict[str, list[str]]:
     """For each effect of a model, the others that could take its place in it.
 
@@ -27,18 +28,25 @@ def rivals_of(
         screened: all effects to first order.
         final: the model.
         levels: models that are known, by their number of effects.
+        most: effects that are tried beside others of the model, the most promising.
     """
     found: dict[str, list[str]] = {}
+    others = [e for e in models.effects if e not in final.effects]
+    screen = screened() if len(final.effects) > 1 else None
     for own in final.effects:
         kept = [e for e in final.effects if e is not own]
+        level = levels[len(final.effects)]
+        known = {other: [m for m in level if set(m.effects) == {other, *kept}] for other in others}
+        if screen is not None:
+            forms = [v for v in final.fit.variants if models.effect_of(v) is not own]
+            combinations = screen.instead(forms, [e for e in others if not known[e]], most)
+            for model in models.weighed(models.fitted(combinations, starts=1)):
+                if model.criterion < final.criterion + REFINED_WITHIN:
+                    (other,) = set(model.effects) - set(kept)
+                    known[other].append(models.refined(model))
         found[own.name] = []
-        for other in (e for e in models.effects if e not in final.effects):
-            known = [m for m in levels[len(final.effects)] if set(m.effects) == {other, *kept}]
-            if kept and not known:
-                forms = [v for v in final.fit.variants if models.effect_of(v) is not own]
-                fits = models.fitted(screened().instead(forms, other), starts=1)
-                known = models.best_refined(models.weighed(fits))
-            best = min(known, key=lambda m: m.criterion, default=None)
+        for other, mine in known.items():
+            best = min(mine, key=lambda m: m.criterion, default=None)
             like = best is not None and near(models, best, final, shapes=not own.listed)
             if like or {own.name, other.name} <= models.experiment.alike:
                 found[own.name].append(other.name)

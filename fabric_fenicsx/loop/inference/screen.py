@@ -140,13 +140,21 @@ class Screen:
         chosen = self._ranked(sets, count)
         return [tuple((g.variant, g.signature) for g in one) for one in chosen]
 
-    def instead(self, kept: Sequence[Variant], other: Effect) -> list[Combination]:
-        """The best combinations of some forms with an effect."""
-        sets: list[tuple[_Group, ...]] = [(g,) for g in self._groups if g.effect is other]
+    def instead(
+        self, kept: Sequence[Variant], others: Sequence[Effect], count: int
+    ) -> list[Combination]:
+        """The best combinations of some forms with each of the most promising other effects.
+
+        Args:
+            kept: the forms.
+            others: the effects.
+            count: how many of them.
+        """
+        sets: list[tuple[_Group, ...]] = [(g,) for g in self._groups if g.effect in others]
         for variant in kept:
             own = [g for g in self._groups if g.variant is variant]
             sets = [(*one, g) for one in sets for g in own]
-        chosen = self._ranked([one for one in sets if _compatible(one)], 1)
+        chosen = self._ranked([one for one in sets if _compatible(one)], count)
         return [tuple((g.variant, g.signature) for g in one) for one in chosen]
 
     def _pairs(self) -> list[tuple[_Group, ...]]:

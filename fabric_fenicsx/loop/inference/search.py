@@ -150,7 +150,8 @@ class _Search:
         misfit = self.judge.misfit(judged)
         curve = self._curve(judged) if verdict == "unexplained" else None
         of_the_curve = self._of_the_curve(levels) if curve is not None else ()
-        rivals = rivals_of(self.models, self._screened, final, levels)
+        most = CRITERIA.terms if self._screened_first else len(self.effects)
+        rivals = rivals_of(self.models, self._screened, final, levels, most)
         for candidate in candidates:
             if candidate.fit is not None:
                 # Those far behind have not got their own noise and scatter yet.
