@@ -285,7 +285,7 @@ def test_two_ranks_equal_one(tmp_path):
 
 
 def test_a_mesh_of_another_strip_is_refused():
-    case = BiasExtensionCase.model_validate(SMALL)
+    case = BiasExtensionCase.model_validate(SMALL | {"mesh": "own.msh"})
     shorter = mesh_net(BiasStrip(90.0, 40.0).layout(case.spacings))
     with pytest.raises(InputError, match=r"^mesh: no node in a clamp, allowed is .* -50 and 50$"):
         bias_extension.clamps(shorter, case)
@@ -293,6 +293,12 @@ def test_a_mesh_of_another_strip_is_refused():
     beside = replace(shorter, crossings=shorter.crossings[sides])
     with pytest.raises(InputError, match=r"^mesh: no crossing about the origin"):
         bias_extension.middle_zone(beside, case)
+    # Of a strip of its own keys they say what to change.
+    narrow = {"bias_deg": 30, "length_mm": 300, "width_mm": 20}
+    meshes = {"warp_spacing_mm": 40, "weft_spacing_mm": 40}
+    case = BiasExtensionCase.model_validate(SMALL | narrow | meshes)
+    with pytest.raises(InputError, match=r"^width_mm: 20 with tows 40 and 40 mm apart \(warp_spa"):
+        bias_extension.clamps(mesh_net(case.strip.layout(case.spacings)), case)
 
 
 def test_bending_in_the_plane_by_default():

@@ -160,17 +160,26 @@ def clamps(net: Net, case: BiasExtensionCase) -> tuple[Integers, Integers]:
     """Nodes in the lower and in the upper clamp line, where the tows are cut.
 
     Raises:
-        InputError: a mesh of the user's own has none there.
+        InputError: there are none, as in a strip far narrower than its meshes.
     """
     short = SHORTEST_END * max(case.spacings) / case.subdivisions
     inner = case.length_mm / 2.0 - short
     lower, upper = (np.flatnonzero(side * net.points[:, 1] >= inner) for side in (-1.0, 1.0))
     if not (len(lower) and len(upper)):
-        raise InputError(
-            f"mesh: no node in a clamp, allowed is one with tows to y = -{case.length_mm / 2.0:g} "
-            f"and {case.length_mm / 2.0:g}"
-        )
+        y = case.length_mm / 2.0
+        raise _lacking(case, "no node in a clamp", f"tows to y = -{y:g} and {y:g}")
     return lower, upper
+
+
+def _lacking(case: BiasExtensionCase, what: str, needed: str) -> InputError:
+    """Why a net is no strip: for its keys, or as a mesh of the user's own."""
+    if case.mesh is not None:
+        return InputError(f"mesh: {what}, allowed is one with {needed}")
+    a, b = case.spacings
+    return InputError(
+        f"width_mm: {case.width_mm:g} with tows {a:.3g} and {b:.3g} mm apart (warp_spacing_mm, "
+        f"weft_spacing_mm): {what}, allowed is a wider strip or smaller spacings"
+    )
 
 
 def slip_limit(case: BiasExtensionCase) -> float | None:
@@ -224,16 +233,14 @@ def middle_zone(net: Net, case: BiasExtensionCase) -> tuple[Integers, Integers]:
     """Crossings whose two tows end in no clamp, zone A, and those of A at half its size.
 
     Raises:
-        InputError: a mesh of the user's own has none.
+        InputError: there are none.
     """
     places = net.points[net.crossings[:, 0]]
     zone, centre = (
         np.flatnonzero(case.strip.gripped(factor * places) == 0) for factor in (1.0, 2.0)
     )
     if not len(centre):
-        raise InputError(
-            "mesh: no crossing about the origin, allowed is one with tows that end in no clamp"
-        )
+        raise _lacking(case, "no crossing about the origin", "tows that end in no clamp")
     return zone, centre
 
 
