@@ -27,6 +27,7 @@ import logging
 import os
 import platform
 import re
+import sys
 import sysconfig
 import tempfile
 from collections.abc import Iterator
@@ -56,6 +57,10 @@ import ufl
 from dolfinx import fem
 from dolfinx.fem import Function
 from dolfinx.mesh import GhostMode, create_mesh
+
+# Some releases of dolfinx leave Python loading every library for all to see and bound at once. What
+# comes after, VTK's drawing above all, is searched through a hundred of them: 0.15 s.
+sys.setdlopenflags(os.RTLD_LAZY)
 
 __all__ = [
     "NOT_A_NUMBER",
