@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 import numpy as np
 import pytest
+from on_ranks import small_model
 from solve import GivenSection, plain_net
 from test_rigs import SMALL, session
 
@@ -212,6 +213,43 @@ def test_chains_of_one_bad_tangent_are_tried_again(symmetric):
         np.testing.assert_allclose(again, x, rtol=0, atol=1e-10 * np.abs(x).max())
     assert condensed.unknowns == unknowns
     assert not condensed.refused.any()
+
+
+@pytest.mark.mpi
+@KINDS
+def test_no_two_factorisations_lie_side_by_side(monkeypatch, symmetric):
+    """That of the chains before is gone when that without one of them is made."""
+    there = []
+    make = Condensed._new_solver
+
+    def noted(self):
+        there.append(bool(getattr(self, "_solver", None)))
+        return make(self)
+
+    monkeypatch.setattr(Condensed, "_new_solver", noted)
+    system = Blocks(plain_net(3, 4, 4.0, 4), symmetric=symmetric)
+    condensed, _ = both(system)
+    system.size = 0.0
+    condensed.assemble()
+    condensed.factorise()
+    assert condensed.refused.any()
+    assert there == [False, False]
+
+
+@pytest.mark.mpi
+def test_what_newton_has_released_is_made_anew():
+    model = small_model(MPI.COMM_WORLD)
+    newton = model.newton(force_tolerance=1e-9, limit=20)
+    model.system.nodal_loads[:, 2] = 1e-3
+    found = []
+    for _ in range(2):
+        newton.x.set(0.0)
+        assert newton.solve(model.targets(0.0, 0.0)).converged
+        found.append(newton.x.array_r.copy())
+        newton.release()
+        assert newton.unknowns == 0
+    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-12)
+    assert np.abs(found[0]).max() > 1e-3
 
 
 def with_and_without(monkeypatch, run):

@@ -303,3 +303,22 @@ def test_step_files_of_other_versions(tmp_path, capsys):
     rows = pd.read_csv(results / "steps.csv")
     assert rows["step"].to_list() == list(range(1, len(rows) + 1))
     assert np.diff(rows["time_s"]).min() > 0.0 and rows.notna().all(axis=None)
+
+
+def test_a_large_array_gives_its_memory_back():
+    """Also where something that stays was put behind it; a library of PETSc's would keep it."""
+    code = """
+import numpy as np
+from fabric_fenicsx import _dolfinx
+def resident():
+    pages = open("/proc/self/statm").read().split()[1]
+    return 4096 * int(pages)
+before = resident()
+large = np.ones(2**25)
+behind = np.ones(2**16)
+between = resident()
+del large
+assert between - before > 0.9 * 2**28, (before, between)
+assert resident() - before < 0.1 * 2**28, (before, resident())
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

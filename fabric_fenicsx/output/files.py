@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import errno
-import io
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +42,7 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         OSError: it cannot be written; what was there before stays.
     """
-    _write(path, text.encode("utf-8"))
+    _write(path, lambda file: file.write(text.encode("utf-8")))
 
 
 def append_text(path: Path, text: str) -> None:
@@ -81,10 +81,16 @@ def write_npz(
     Raises:
         OSError: they cannot be written; what was there before stays.
     """
-    # In memory first: an archive that cannot be closed complains on its own behalf.
-    memory = io.BytesIO()
-    (np.savez_compressed if compressed else np.savez)(memory, **arrays)
-    _write(path, memory.getbuffer(), durable=durable)
+    kind = ZIP_DEFLATED if compressed else ZIP_STORED
+
+    def write(file: IO[bytes]) -> None:
+        # As numpy.savez does, whose archive complains on its own behalf where the disk is full.
+        with ZipFile(file, "w", kind) as archive:
+            for name, array in arrays.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                    np.lib.format.write_array(entry, np.asarray(array), allow_pickle=False)
+
+    _write(path, write, durable=durable)
 
 
 def write_vtk(path: Path, data: Any, *, portable: bool = False) -> None:
@@ -113,12 +119,13 @@ def write_vtk(path: Path, data: Any, *, portable: bool = False) -> None:
     if writer.Write() != 1:
         raise OSError(f"{path}: VTK cannot write it")
     text = writer.GetOutputString()
-    _write(path, text if isinstance(text, bytes) else text.encode("utf-8"))
+    data = text if isinstance(text, bytes) else text.encode("utf-8")
+    _write(path, lambda file: file.write(data))
 
 
-def _write(path: Path, data: bytes | memoryview, *, durable: bool = False) -> None:
+def _write(path: Path, write: Callable[[IO[bytes]], object], *, durable: bool = False) -> None:
     with replacing(path) as partial, partial.open("wb") as file:
-        file.write(data)
+        write(file)
         if durable:
             file.flush()
             os.fsync(file.fileno())

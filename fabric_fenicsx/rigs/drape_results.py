@@ -62,11 +62,11 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
 
 def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[dict[str, Any]]:
     """The case's points with the acute angle there, as a protractor on a photograph gives it."""
-    from .kinematic import known_angles
-
     snapshot = outcome.last
     if not case.points or snapshot is None:
         return []
+    from .kinematic import known_angles
+
     places = np.array([[p.x_mm, p.y_mm] for p in case.points])
     quarter = case.symmetry == "quarter"
     angles = (axes_shear(snapshot.axes), snapshot.shear_angle, snapshot.director_turn)

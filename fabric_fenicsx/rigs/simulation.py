@@ -128,6 +128,8 @@ def simulate(
             stepper.predictor.forget()
     except SolveError as error:
         stop = str(error)
+    # Pictures need as much again.
+    newton.release()
     # The last step file may be another rank's.
     model.comm.barrier()
     seconds = {

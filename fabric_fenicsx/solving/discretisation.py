@@ -367,12 +367,16 @@ class Discretisation:
             self._numbers[kind] = np.concatenate(parts), np.array([len(part) for part in parts])
         numbers, counts = self._numbers[kind]
         here = to is None or comm.rank == to
-        rows, whole = np.zeros((2, len(numbers) if here else 0, local.shape[1]))
         sent = np.ascontiguousarray(local, dtype=np.float64)
-        if to is None:
-            comm.Allgatherv(sent, (rows, counts * local.shape[1]))
+        if comm.size == 1:
+            rows = sent
         else:
-            comm.Gatherv(sent, (rows, counts * local.shape[1]) if here else None, root=to)
+            rows = np.zeros((len(numbers) if here else 0, local.shape[1]))
+            if to is None:
+                comm.Allgatherv(sent, (rows, counts * local.shape[1]))
+            else:
+                comm.Gatherv(sent, (rows, counts * local.shape[1]) if here else None, root=to)
+        whole = np.zeros_like(rows)
         if here:
             whole[numbers] = rows
         return whole

@@ -208,6 +208,13 @@ class Newton:
 
         return solve
 
+    def release(self) -> None:
+        """Give back matrices and factorisations; a further solve makes its own. Collective."""
+        for part in (*self._solvers.values(), *self._tangents.values()):
+            part.destroy()
+        self._solvers.clear()
+        self._tangents.clear()
+
     @property
     def unknowns(self) -> int:
         """How many unknowns the matrices that were factorised have at most."""

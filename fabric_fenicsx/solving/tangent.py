@@ -118,6 +118,11 @@ class Whole:
             y.array[:] = values
         return True
 
+    def destroy(self) -> None:
+        """Give back the matrices and the factorisation. Collective."""
+        for one in (self._solver, self._A, self.matrix):
+            one.destroy()
+
 
 class Condensed:
     """The tangent of a system without the nodes between crossings, see ``condensation``.
@@ -197,6 +202,18 @@ class Condensed:
         )
         self._places = [part.astype(PETSc.IntType)[:, None] for part in self._elimination.places]
 
+    def _renumber(self) -> None:
+        """The same with other chains."""
+        # First, or two factorisations would lie side by side.
+        for one in (self._solver, self._R, self._scale):
+            one.destroy()
+        self._number()
+
+    def destroy(self) -> None:
+        """Give back the matrices and the factorisation. Collective."""
+        for one in (self._solver, self._R, self._A, self.matrix):
+            one.destroy()
+
     def _new_solver(self) -> PETSc.KSP:
         comm, symmetric = self._net.comm, self._symmetric
         # MUMPS takes the order as given, for LU of scalar matrices on one rank only.
@@ -224,7 +241,7 @@ class Condensed:
         self._since += 1
         if self.refused.any() and self._since > AGAIN:
             self.refused[:] = False
-            self._number()
+            self._renumber()
         while True:
             unstable = self._elimination.eliminate(_stored_blocks(self._A), self._free)
             found = self._net.comm.allgather(self._runs.only(unstable).nodes)
@@ -232,7 +249,7 @@ class Condensed:
                 break
             self.refused[np.concatenate(found)] = True
             self._since = 0
-            self._number()
+            self._renumber()
         R, elimination = self._R, self._elimination
         R.zeroEntries()
         R.setValuesBlockedRCV(*self._places, elimination.left, addv=PETSc.InsertMode.ADD_VALUES)
