@@ -91,6 +91,7 @@ def section(folders: Sequence[Path], report: dict[str, Any]) -> str:
         f"it: {noise['words']}.",
         "",
     ]
+    lines += _left_out(report)
     lines += _laboratories(report)
     lines += _parameters(report)
     rivals = {name for effect in report["effects"] for name in effect["rivals"]}
@@ -128,6 +129,18 @@ def _errors(report: dict[str, Any]) -> list[str]:
     return table(*rows)
 
 
+def _left_out(report: dict[str, Any]) -> list[str]:
+    """Single readings that stand out."""
+    found = [
+        f"{number(one['observed'])} (reading {one['reading']} of "
+        f"{Path(one['folder']).name}/{one['file']})"
+        for one in report["left_out"]["outliers"]
+    ]
+    if not found:
+        return []
+    return [f"Left out, as single readings that stand out: {', '.join(found)}.", ""]
+
+
 def _laboratories(report: dict[str, Any]) -> list[str]:
     if not report["laboratories"]:
         return []
@@ -144,7 +157,8 @@ def _laboratories(report: dict[str, Any]) -> list[str]:
 
 def _parameters(report: dict[str, Any]) -> list[str]:
     model = report["best"] or report["model"]
-    rows = [("parameter", "value", "±")]
+    forms = [f"{one['name']} ({one['variant']})" for one in model["effects"]]
+    rows = [("parameter of the baseline" + "".join(f" + {form}" for form in forms), "value", "±")]
     rows += [(f"`{k}`", number(v), number(model["std"][k])) for k, v in model["parameters"].items()]
     lines = table(*rows)
     differ = [
