@@ -326,7 +326,7 @@ Forces of strips pulled at 45 degrees, read from published figures, each table b
 and written here by `python scripts/strips_page.py`. None of the readings is kept in this
 repository. Bold is the model that came nearest; where the verdict is *unexplained* it is not
 accepted, and what it foretells is no more than its best guess. Models of one effect are those of
-the same diagnosis, pairs those of diagnoses with these two effects.
+the same diagnosis, pairs those of diagnoses with two of them that took both.
 """
 
 OTHER = """The strip of another laboratory, {size}, of which these models have seen nothing: errors
