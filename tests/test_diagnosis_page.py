@@ -262,6 +262,12 @@ def test_reasons_stand_where_a_rival_has_a_smaller_error():
     assert "worse by 3.0: the data do not decide" in near
     assert far.startswith("far has a smaller error (held out 0.04 N against 0.05 N)")
     assert "worse by 50" in far
+    better = [candidate("near", 0.04, 0.06, 95.0)]
+    (vetoed,) = reasons(report | {"candidates": better})
+    assert "better by 5.0: it did not bear scrutiny" in vetoed
+    rival = {"name": "chosen", "rivals": ["near"]}
+    (equal,) = reasons(report | {"effects": [rival], "candidates": better})
+    assert "better by 5.0: the data do not decide" in equal
     (none,) = reasons(REPORT | {"candidates": candidates[1:]})
     assert none.endswith("the most is −3.0, of near.")
     nearest = {"effects": [{"name": "near"}], "error_fit": 0.2}

@@ -201,7 +201,7 @@ def reasons(report: Mapping[str, Any]) -> list[str]:
     chosen = [effect["name"] for effect in report["effects"]]
     chosen += [effect["name"] for effect in report["beside"]]
     chosen += [term["of"] for term in report["discovered"]]
-    rivals = [name for effect in report["effects"] for name in effect["rivals"]]
+    rivals = [name for effect in report["effects"] for name in effect.get("rivals", ())]
     found = []
     for c in (c for c in tried if c["name"] not in chosen):
         smaller = [
@@ -212,20 +212,17 @@ def reasons(report: Mapping[str, Any]) -> list[str]:
             and c[f"error_{kind}"] < (1.0 - SMALLER) * mine
         ]
         if smaller:
-            loses = c["criterion"] - own
-            if c["name"] in rivals and loses < 0.0:
-                what = f"{c['name']} has a smaller error ({', '.join(smaller)})"
-                found.append(f"{what}; the data do not decide between the two.")
-            else:
-                found.append(_weighed(c, ", ".join(smaller), loses))
+            rival = c["name"] in rivals
+            found.append(_weighed(c, ", ".join(smaller), c["criterion"] - own, rival=rival))
     return found
 
 
-def _weighed(candidate: Mapping[str, Any], smaller: str, loses: float) -> str:
+def _weighed(candidate: Mapping[str, Any], smaller: str, loses: float, *, rival: bool) -> str:
     """Why a candidate with a smaller error was not chosen."""
     text = f"{candidate['name']} has a smaller error ({smaller}), "
     if loses < 0.0:
-        return text + f"and its criterion is better by {-loses:.1f}: it did not bear scrutiny."
+        why = "the data do not decide" if rival else "it did not bear scrutiny"
+        return text + f"and its criterion is better by {-loses:.1f}: {why}."
     if loses < CRITERIA.decisive:
         return text + f"its criterion is worse by {loses:.1f}: the data do not decide."
     return text + (
