@@ -20,7 +20,6 @@ Offered:
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
 import importlib.util
 import inspect
@@ -62,16 +61,6 @@ from dolfinx.mesh import GhostMode, create_mesh
 # Some releases of dolfinx leave Python loading every library for all to see and bound at once. What
 # comes after, VTK's drawing above all, is searched through a hundred of them: 0.15 s.
 sys.setdlopenflags(os.RTLD_LAZY)
-
-# SuperLU_DIST, to which Debian's PETSc is linked, tells malloc when it is loaded to keep what is
-# freed and to put even factorisations into one heap, which breaks up. Back to what glibc does: from
-# this size [bytes] on an array has pages of its own, which the system gets back with it.
-_PAGES_OF_ITS_OWN = 2**25
-_M_MMAP_MAX, _M_MMAP_THRESHOLD, _M_TRIM_THRESHOLD = -4, -3, -1
-if _mallopt := getattr(ctypes.CDLL(None), "mallopt", None):
-    _mallopt(_M_MMAP_MAX, 2**16)
-    _mallopt(_M_MMAP_THRESHOLD, _PAGES_OF_ITS_OWN)
-    _mallopt(_M_TRIM_THRESHOLD, 2 * _PAGES_OF_ITS_OWN)
 
 __all__ = [
     "NOT_A_NUMBER",

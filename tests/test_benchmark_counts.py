@@ -110,7 +110,7 @@ def test_what_a_step_of_a_drape_costs_beside_its_iterations(tmp_path, monkeypatc
     count, result = counted_drape(tmp_path, monkeypatch)
     steps = result["steps"]
     assert count["residual"] == count["_function"] + count["firm_up found"]
-    assert count["cell_sums"] == 4 * steps
+    assert count["cell_sums"] == 2 * steps
     assert count["_gather"] == 9 * steps
 
 

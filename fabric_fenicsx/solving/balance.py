@@ -79,8 +79,9 @@ class Balance:
             row |= {f"{tool.name}_force_{a}_N": float(f) for a, f in zip("xyz", force, strict=True)}
         self.external += self._parts * (model.weight_work(outside) + self._support_work())
 
-        energies = {name: self._parts * e for name, e in model.system.energies().items()}
-        self.lost += self._parts * sum(model.system.losses().values())
+        energies, losses = model.system.sums("energy", "loss")
+        energies = {name: self._parts * e for name, e in energies.items()}
+        self.lost += self._parts * sum(losses.values())
         kinetic = energies.get("inertia", 0.0)
         stored = sum(energies.values()) - kinetic
         row |= {f"energy_{name.replace(' ', '_')}_N_mm": e for name, e in energies.items()}

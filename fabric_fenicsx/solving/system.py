@@ -58,7 +58,7 @@ class System:
                 f"{next(n for n in names if names.count(n) > 1)}: a term that is twice"
             )
         self._forms: dict[str, Any] = {}
-        self._shares: dict[tuple[str, str], tuple[list[str], Any, Any]] = {}
+        self._shares: dict[Any, tuple[list[tuple[str, str]], Any, Any]] = {}
         # One kernel call and one insertion per cell for all terms of a mesh.
         self._residuals = {mesh: self._sum("residual", mesh) for mesh in MESHES}
         self._tangents = {mesh: self._sum("tangent", mesh) for mesh in MESHES}
@@ -208,33 +208,43 @@ class System:
 
     def energies(self) -> dict[str, float]:
         """Stored energy of each term that has one [N mm], summed over the ranks."""
-        return self._summed("energy")
+        return self.sums("energy")[0]
 
     def losses(self) -> dict[str, float]:
         """Energy that each dissipative term has lost over the step [N mm], over all ranks."""
-        return self._summed("loss")
+        return self.sums("loss")[0]
 
-    def _summed(self, part: str) -> dict[str, float]:
-        own: dict[str, float] = {}
+    def sums(self, *parts: str) -> list[dict[str, float]]:
+        """Parts of all terms that have them, as "energy" and "loss" [N mm], summed over the ranks.
+
+        What the parts that are asked for together have in common is evaluated once. Collective.
+        """
+        own: dict[tuple[str, str], float] = {}
         for mesh in MESHES:
-            names, space, form = self._together(part, mesh)
+            names, space, form = self._together(parts, mesh)
             sums = np.zeros(len(names)) if form is None else _dolfinx.cell_sums(form, space)
             own |= dict(zip(names, sums, strict=True))
-        names = [term.name for term in self.terms if term.name in own]
-        total = np.zeros(len(names))
-        self.net.comm.Allreduce(np.array([own[name] for name in names]), total)
-        return dict(zip(names, total.tolist(), strict=True))
+        total = np.zeros(len(own))
+        self.net.comm.Allreduce(np.array(list(own.values())), total)
+        found = dict(zip(own, total.tolist(), strict=True))
+        return [
+            {t.name: found[part, t.name] for t in self.terms if (part, t.name) in found}
+            for part in parts
+        ]
 
-    def _together(self, part: str, mesh: str) -> tuple[list[str], Any, Any]:
-        """Names of the terms on a mesh that have a part, and these parts side by side. Collective.
+    def _together(
+        self, parts: tuple[str, ...], mesh: str
+    ) -> tuple[list[tuple[str, str]], Any, Any]:
+        """Parts and names of the terms on a mesh that have them, and these side by side.
 
-        A rank without crossings has names only.
+        Collective. A rank without crossings has names only.
         """
-        key = (part, mesh)
+        key = (parts, mesh)
         if key not in self._shares:
             comm = self.net.comm
             here = {
-                term.name: getattr(term, part)
+                (part, term.name): getattr(term, part)
+                for part in parts
                 for term in self.terms
                 if term.where == mesh and getattr(term, part) is not None
             }

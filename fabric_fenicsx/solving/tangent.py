@@ -27,7 +27,7 @@ from .discretisation import Discretisation
 from .ordering import nested_dissection
 from .system import System
 
-__all__ = ["Condensed", "Whole", "fail", "tangent_of"]
+__all__ = ["Condensed", "Whole", "fail", "give_back", "tangent_of"]
 
 Array = npt.NDArray[np.float64]
 
@@ -120,8 +120,7 @@ class Whole:
 
     def destroy(self) -> None:
         """Give back the matrices and the factorisation. Collective."""
-        for one in (self._solver, self._A, self.matrix):
-            one.destroy()
+        _destroy(self._solver, self._A, self.matrix)
 
 
 class Condensed:
@@ -205,14 +204,12 @@ class Condensed:
     def _renumber(self) -> None:
         """The same with other chains."""
         # First, or two factorisations would lie side by side.
-        for one in (self._solver, self._R, self._scale):
-            one.destroy()
+        _destroy(self._solver, self._R, self._scale)
         self._number()
 
     def destroy(self) -> None:
         """Give back the matrices and the factorisation. Collective."""
-        for one in (self._solver, self._R, self._A, self.matrix):
-            one.destroy()
+        _destroy(self._solver, self._R, self._A, self.matrix)
 
     def _new_solver(self) -> PETSc.KSP:
         comm, symmetric = self._net.comm, self._symmetric
@@ -345,6 +342,23 @@ def _owners(disc: Discretisation) -> npt.NDArray[np.int64]:
     """Rank that owns each node of the net, on every rank. Collective."""
     last = np.cumsum(disc.comm.allgather(disc.owned))
     return np.searchsorted(last, disc.node_block, side="right")
+
+
+def _destroy(*objects: Any) -> None:
+    """Destroy PETSc's objects; what they held goes back to the system. Collective."""
+    for one in objects:
+        one.destroy()
+    give_back()
+
+
+def give_back() -> None:
+    """Have malloc return what is free to the system.
+
+    SuperLU_DIST, to which Debian's PETSc is linked, tells it to keep everything when it is loaded.
+    """
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
 
 
 @cache
