@@ -111,3 +111,31 @@ def test_noise_that_grows_with_the_reading_leaves_none_out(seed):
     out, share = judged(x + noise, x)
     assert share > 1e-2
     assert not out
+
+
+@pytest.mark.parametrize(("off", "foretold"), [(1.0, True), (4.0, False)])
+def test_a_specimen_four_times_as_far_off_as_expected_is_not_foretold(off, foretold):
+    """However many readings share its deviation: there it is one number among eighty of noise."""
+    rng = np.random.default_rng(5)
+    run = np.repeat(np.arange(7), 80)
+    x = np.tile(np.linspace(0.0, 1.0, 80), 7)
+    factor = 1.0 + 0.1 * np.array([1.2, -0.8, 0.3, -1.3, 0.9, -0.3, 0.0])[run]
+    observed = 10.0 * factor * x + 0.05 * rng.normal(size=len(x))
+
+    def weighed(observed):
+        experiment = Linear(readings(observed, run=run, holdout=[6]), {"slope": x}, ["slope"])
+        judge = Judge(experiment, [])
+        variances = Variances(Noise(0.05), {"slope": 0.1})
+        model = judge.weighed(fit(experiment, (), {"slope": 10.0}, run < 6, variances), ())
+        averaged = judge.averaged(model)
+        return judge, judge.weighed(fit(experiment, (), model.fit.values, run < 6, averaged), ())
+
+    judge, model = weighed(observed)
+    expected = judge.expected_holdout(model.fit, judge.misfit(model).noise)
+    held = run == 6
+    size = np.sqrt(np.mean(x[held] ** 2))
+    # So that its error is so many times what is expected.
+    observed[held] += off * expected / size * x[held]
+    judge, model = weighed(observed)
+    assert judge.holdout(model.fit) == pytest.approx(off * expected, rel=0.2)
+    assert judge.foretells(model) == foretold

@@ -242,6 +242,10 @@ class Judge:
         if out.any():
             error = model.fit.predictive_rms(out)
             count = int(out.sum())
+            # One specimen's deviation is a single number, however many readings share it.
+            expected = self.expected_holdout(model.fit, self.misfit(model).noise)
+            if self.holdout(model.fit) > CRITERIA.significant * expected:
+                return False
         else:
             error = self.left_out(model.fit).predictive
             count = int(model.fit.used.sum())
