@@ -270,10 +270,15 @@ def test_reasons_stand_where_a_rival_has_a_smaller_error():
     assert "better by 5.0: the data do not decide" in equal
     (none,) = reasons(REPORT | {"candidates": candidates[1:]})
     assert none.endswith("the most is −3.0, of near.")
-    nearest = {"effects": [{"name": "near"}], "error_fit": 0.2}
+    nearest = {"effects": [{"name": "near"}], "error_fit": 0.2, "error_holdout": None}
     unexplained = REPORT | {"verdict": "unexplained", "candidates": candidates[1:]}
     assert "than the baseline itself" in headline(unexplained)
     assert headline(unexplained | {"best": nearest}).endswith("with 0.2 N left in the fitted runs.")
+    noise = REPORT["error"]["noise"]
+    held = nearest | {"error_fit": noise, "error_holdout": 5.0}
+    assert headline(unexplained | {"best": held}).endswith(
+        f"with {noise:g} N left in the fitted runs, but 5 N in the held-out ones."
+    )
     assert reasons(unexplained) == []
     # Both errors are the noise's: what is wrong is the structure, not the held-out readings.
     assert "structure" in headline(unexplained) and "held-out ones" not in headline(unexplained)

@@ -107,7 +107,12 @@ def _verdict(report: Mapping[str, Any]) -> str:
     if best is not None and best["effects"]:
         names = _listed([effect["name"] for effect in best["effects"]])
         left = _value(report, best["error_fit"])
-        text += f" Nearest came {names}, with {left} left in the fitted runs."
+        text += f" Nearest came {names}, with {left} left in the fitted runs"
+        after = best["error_holdout"]
+        if after is not None and best["error_fit"] <= noise < after:
+            # Else a reader would wonder what it lacks.
+            text += f", but {_value(report, after)} in the held-out ones"
+        text += "."
     elif report["candidates"]:
         text += " None comes nearer than the baseline itself, for what it adds."
     return text
