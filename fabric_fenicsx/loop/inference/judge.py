@@ -130,11 +130,12 @@ class Judge:
         noise = model.variances.noise
         # One at the end of a line may look like noise that grows with the reading: what the others
         # scatter by decides.
+        found = self._standing_out(model, noise)
         suspected = self._standing_out(model, Noise(noise.floor)) & model.used
-        if noise.share > 0.0 and (suspected & ~self._standing_out(model, noise)).any():
+        if (suspected & ~found).any():
             others = linearised(self._experiment, model).without(suspected)
             noise = self._estimated(others, model.variances).variances.noise
-        found = self._standing_out(model, noise)
+            found = self._standing_out(model, noise)
         changed = bool((found != self.outliers)[self._readings.fit].any())
         self.outliers = found
         return changed

@@ -162,12 +162,13 @@ class Models:
         ]
         # A form of which nothing is left says nothing of its effect.
         order = sorted(range(len(found)), key=lambda k: (_nothing_left(found[k]), first[k]))
+        sets = [frozenset(own) for own in effects]
         seen: list[frozenset[Effect]] = []
         models = []
         for rank, k in enumerate(order):
             near = rank < MOST_NEAR and first[k] < first[order[0]] + CRITERIA.decisive
-            if near or seen.count(frozenset(effects[k])) < OF_A_SET:
-                seen.append(frozenset(effects[k]))
+            if near or seen.count(sets[k]) < OF_A_SET:
+                seen.append(sets[k])
                 models.append(self.judge.weighed(found[k], effects[k]))
         return sorted(models, key=lambda m: m.criterion)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from math import inf
 from typing import Any, ClassVar
 
@@ -359,14 +360,7 @@ class CrossheadTest:
 
     def _per_second(self, x: Varying) -> Varying:
         """How fast something changes along each record: differences of second order within it."""
-        step = np.diff(self._points["time"].value, axis=0)
-        before, after = step[:-1], step[1:]
-        both = before + after
-        weights = (
-            -after / (before * both),
-            (after - before) / (before * after),
-            before / (after * both),
-        )
+        step, weights = self._differences
 
         def rate(values: Array) -> Array:
             values = np.broadcast_to(values, (len(step) + 1, step.shape[1]))
@@ -378,6 +372,18 @@ class CrossheadTest:
             return found
 
         return Varying(rate(x.value), {p: rate(slope) for p, slope in x.slopes.items()})
+
+    @cached_property
+    def _differences(self) -> tuple[Array, tuple[Array, Array, Array]]:
+        """Steps of time, and weights of a value and its neighbours in how fast it changes."""
+        step = np.diff(self._points["time"].value, axis=0)
+        before, after = step[:-1], step[1:]
+        both = before + after
+        return step, (
+            -after / (before * both),
+            (after - before) / (before * after),
+            before / (after * both),
+        )
 
     def _moved(self, travel: Any, ahead: Varying) -> dict[str, Varying]:
         """A travel with what is added to it, and its rate."""

@@ -24,8 +24,9 @@ ROUNDING = Parameter(
 )
 # Friction has its moment at the usual rates of a test: what saturates among them is a dashpot.
 SHARP = replace(ROUNDING, upper=0.2, starts=(5e-3, 0.05), share_of="typical_rate")
-#: Of two roundings, the second so many times the first: it is to be all but as sharp.
+#: Of two roundings, the second is so many times the first.
 SECOND = 6.0
+# The second one, too, is to be all but as sharp.
 BOTH_SHARP = replace(SHARP, upper=0.25 / SECOND, starts=(1e-3, 0.01))
 SLOW = Parameter(
     "saturation_rad_s",
