@@ -29,7 +29,10 @@ from matplotlib.figure import Figure
 import fabric_fenicsx as ff
 from fabric_fenicsx.loop.fabric import fabric_content, write_fabric
 from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
+from fabric_fenicsx.loop.inference.judge import Judge
+from fabric_fenicsx.loop.kinds.bias_extension.frame_law import FRAME_SHARE
 from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
+from fabric_fenicsx.loop.kinds.bias_extension.with_frames import KEPT
 
 PAGE = Path(__file__).parents[1] / "docs" / "measured_strips.md"
 PICTURE = PAGE.parent / "images" / "measured_strips.png"
@@ -44,22 +47,34 @@ SLIPPED = 0.05
 
 @dataclass(frozen=True)
 class Tried:
-    """A model of strips: its effects, its errors [N] and the file with its fabric."""
+    """A model of strips: its effects, its errors [N] and the file with its fabric.
+
+    Attributes:
+        left_out: error of each strip foretold from the others.
+        kept: whether that is about as small as the least.
+        share: of the frames' locking; None without.
+        forms: of the effects, in words.
+    """
 
     effects: tuple[str, ...]
     fit: float
     holdout: float
     fabric: Path
+    left_out: float
+    kept: bool
+    share: float | None = None
+    forms: str = ""
 
     @property
     def name(self) -> str:
         """In words."""
-        return " + ".join(f"`{name}`" for name in self.effects) or "baseline, pinned"
+        own = " + ".join(f"`{name}`" for name in self.effects)
+        return own + (f" ({self.forms})" if self.forms else "") or "baseline, pinned"
 
     @property
     def key(self) -> str:
         """Of folders."""
-        return "_".join(self.effects) or "baseline"
+        return self.fabric.stem.removeprefix("fabric_")
 
 
 def diagnosed(
@@ -78,7 +93,7 @@ def diagnosed(
         found = ff.diagnose(measurements, out, effects=effects)
         d = found.diagnoses[-1]
         strips = [m for m in measurements if m.test == "bias_extension"]
-        models = [((), d.baseline, d.holdout_before)]
+        models: list[Any] = [((), d.baseline, d.holdout_before)]
         models += [((c.effect.name,), c.fit, c.holdout) for c in d.candidates if c.fit is not None]
         if alone:
             model = partial(BiasExtension, like=d.experiment)
@@ -90,19 +105,42 @@ def diagnosed(
                     best, held = two.best, two.holdout_best
                 if len(best.variants) == 2:
                     models.append((pair, best, held))
+        judge = Judge(d.experiment, list(d.experiment.effects))
+        left_out = [judge.left_out(fit).error(d.experiment.readings.first) for _, fit, _ in models]
+        every: list[Any] = [
+            ("_".join(names) or "baseline", names, fit, held, error, error <= KEPT * min(left_out))
+            for (names, fit, held), error in zip(models, left_out, strict=True)
+        ]
+        for j in d.joined:
+            names = tuple(e.name for e in j.effects)
+            key = "_".join(["with_frames", *names])
+            every.append((key, names, j.fit, j.holdout, j.left_out, j.kept))
         tried = []
-        for names, fit, holdout in models:
-            file = f"fabric_{'_'.join(names) or 'baseline'}.yaml"
+        for key, names, fit, holdout, error, kept in every:
+            file = f"fabric_{key}.yaml"
             shown: Diagnosis = replace(d, best=fit, verdict="unexplained")
             write_fabric(out, fabric_content([(shown, strips)], out, nearest=True), file)
             rows = fit.used & d.experiment.readings.first
-            tried.append({"effects": names, "fit": fit.rms(rows), "holdout": holdout, "file": file})
+            forms = [v.label for e in d.experiment.effects for v in e.variants if v in fit.variants]
+            tried.append(
+                {
+                    "effects": names,
+                    "fit": fit.rms(rows),
+                    "holdout": holdout,
+                    "file": file,
+                    "left_out": error,
+                    "kept": bool(kept),
+                    "share": fit.values[FRAME_SHARE] if key.startswith("with") else None,
+                    "forms": ", ".join(forms[1:]) if key.startswith("with") else "",
+                }
+            )
         (out / "tried.json").write_text(json.dumps(tried))
     report: dict[str, Any] = json.loads((out / "report.json").read_text())
     report = report.get("tests", {}).get("bias_extension", report)
     models = json.loads((out / "tried.json").read_text())
     return report, [
-        Tried(tuple(m["effects"]), m["fit"], m["holdout"], out / m["file"]) for m in models
+        Tried(**(m | {"effects": tuple(m["effects"]), "fabric": out / m.pop("file")}))
+        for m in models
     ]
 
 
@@ -175,18 +213,32 @@ def of_models(
     held = [run["label"] or run["file"] for run in runs if run["role"] == "holdout"]
     what = f"held out ({', '.join(held)})" if held else report["holdout_source"]
     places = ", ".join(f"{t:g}" for t in TRAVELS)
-    columns = ["model", "fitted, rms [N]", f"{what} [N]"]
+    columns = ["model", "fitted, rms [N]", "each left out [N]", f"{what} [N]"]
     columns += [f"{SIZE[1]:g} x {SIZE[0]:g} mm: angle [°] at {places} mm"] if curves else []
     yield row(*columns)
     yield "|---" * len(columns) + "|"
     for model in tried:
         shown = [angles(curves[model.key])] if model.key in curves else []
-        yield row(model.name, model.fit, model.holdout, *shown)
+        yield row(model.name, model.fit, model.left_out, model.holdout, *shown)
     best = report["best"] or report["model"]
     if best["effects"]:
         names = " + ".join(f"`{e['name']}` ({e['variant']})" for e in best["effects"])
         shown = [angles(curves["nearest"])] if "nearest" in curves else []
-        yield row(f"**{names}**", best["error_fit"], best["error_holdout"], *shown)
+        yield row(f"**{names}**", best["error_fit"], "", best["error_holdout"], *shown)
+
+
+def of_joined(joined: Sequence[Tried], curves: Mapping[str, pd.DataFrame]) -> Iterator[str]:
+    """The models with the frames' locking, and the angles of the large strip with each."""
+    places = ", ".join(f"{t:g}" for t in TRAVELS)
+    large = f"{SIZE[1]:g} x {SIZE[0]:g} mm: angle [°] at {places} mm"
+    errors = "fitted, rms [N]", "each left out [N]", "held out [N]"
+    yield row("with the frames' locking", "share of it", *errors, large)
+    yield "|---" * 6 + "|"
+    for model in joined:
+        name = model.name if model.effects else "pinned"
+        told = model.share, model.fit, model.left_out, model.holdout
+        shown = angles(curves[model.key]) if model.key in curves else ""
+        yield row(name if model.kept else f"{name}: not kept", *told, shown)
 
 
 def of_the_other(other: Any, tried: Sequence[Tried], near: Path, out: Path) -> Iterator[str]:
@@ -319,19 +371,40 @@ def numbers(report: dict[str, Any]) -> list[str]:
     return ["", f"A reading scatters by {noise:.2g} N. {parameters(report)}.", ""]
 
 
-def large(table: Mapping[str, pd.DataFrame]) -> Iterator[str]:
-    """The large strip with the nearest models, and how well these know it."""
+def over_models(name: str, curves: Sequence[pd.DataFrame], own: pd.DataFrame) -> Iterator[str]:
+    """The large strip by all models that were kept, and how far they are apart.
+
+    Args:
+        name: of them together.
+        curves: of each.
+        own: standard errors of one of them.
+    """
+    angle = np.array([at_travels(curve, "shear_angle_deg") for curve in curves])
+    errors = [at_travels(own, f"shear_angle_deg_{end}") for end in ("fit", "specimens")]
+    std = np.sqrt(np.var(angle, axis=0) + np.sum(np.square(errors), axis=0))
+    mean = angle.mean(axis=0)
+    yield row(
+        f"**{name}: angle [°]**", *(f"{a:.1f} ± {s:.1f}" for a, s in zip(mean, std, strict=True))
+    )
+    span = zip(angle.min(axis=0), angle.max(axis=0), strict=True)
+    yield row(f"{name}: least and most [°]", *(f"{a:.1f} to {b:.1f}" for a, b in span))
+
+
+def large(table: Mapping[str, pd.DataFrame], together: Sequence[str]) -> Iterator[str]:
+    """The large strip with all models, and with the nearest ones, and how well these know it."""
     length, width = SIZE
     formula = ff.BiasStrip(length, width).angle(np.array(TRAVELS))
     yield row("travel [mm]", *(f"{t:g}" for t in TRAVELS))
     yield "|---" * (1 + len(TRAVELS)) + "|"
     yield row("classical formula, angle [°]", *(f"{np.degrees(a):.1f}" for a in formula))
+    yield from together
     for name, curve in table.items():
         columns = [f"shear_angle_deg{end}" for end in ("", "_fit", "_specimens")]
         cells = zip(*(at_travels(curve, column) for column in columns), strict=True)
-        yield row(f"{name}: angle [°]", *(f"{a:.1f} ± {s:.1f} ± {z:.1f}" for a, s, z in cells))
+        own = (f"{a:.1f} ± {s:.1f} ± {z:.1f}" for a, s, z in cells)
+        yield row(f"{name}, nearest: angle [°]", *own)
         force = zip(*(at_travels(curve, f"force_N{end}") for end in ("", "_fit")), strict=True)
-        yield row(f"{name}: force [N]", *(f"{f:.3g} ± {s:.2g}" for f, s in force))
+        yield row(f"{name}, nearest: force [N]", *(f"{f:.3g} ± {s:.2g}" for f, s in force))
 
 
 OPENING = """# Published strips, and other strips foretold
@@ -354,10 +427,17 @@ model has for a dashpot goes by the rate. At small angles it makes {:.2g} N/mm i
 {:.2g} in the other. What is the same at both speeds is rather a friction, and a dashpot that was
 fitted at the higher one foretells too little at the lower one, in the first third of the travel."""
 
-FORETOLD = """The mean angle of all crossings whose two tows end in no clamp, by the nearest
-model above, which has seen neither this size nor an angle. First ± one standard error of the fit,
-then what specimens differ by; that the model may be another one is in neither: the models of the
-first table, of which some fit hardly worse, differ by more."""
+FORETOLD = """The mean angle of all crossings whose two tows end in no clamp. No model has seen
+this size, or an angle. Bold: the mean of all models of a table above that foretell a strip from the
+others with at most {:g} times the least error, each counted once, ± the standard deviation between
+them, a standard error of the fit and what specimens differ by, taken together; then their span.
+Below that the nearest model of all by itself, with one standard error of the fit and with what
+specimens differ by: that it may not be the right model is in neither."""
+
+JOINED = """Locking is what exceeds the frames' least secant stiffness. Here it is the fabric's, in
+a size between those of the laboratories; the rest is each frame's own, and the strips have a law of
+their own at small angles. All is fitted to the strips' forces. Not kept is what foretells a strip
+from the others with more than {:g} times the least error."""
 
 SLIP = """The strip of {size} with `crossover_slip` alone, and where its crossings slipped:"""
 
@@ -379,24 +459,34 @@ def main() -> None:
     text = [OPENING.format(effects=arguments.effects)]
     friction: list[float] = []
     known: dict[str, pd.DataFrame] = {}
+    together: list[str] = []
 
     def add(name: str, folders: Sequence[Path], **how: bool) -> tuple[Path, list[Tried]]:
         out = arguments.out / name.lower().replace(" ", "_")
         report, tried = diagnosed(folders, out, effects, **how)
+        joined = [model for model in tried if model.share is not None]
+        tried = [model for model in tried if model.share is None]
         curves: dict[str, pd.DataFrame] = {}
-        if how["alone"]:
-            for model in tried:
-                folder = pulled(out / f"large_{model.key}", model.fabric, spacing)
-                curves[model.key] = pd.read_csv(folder / "curve.csv")
+        for model in tried if how["alone"] else joined:
+            folder = pulled(out / f"large_{model.key}", model.fabric, spacing)
+            curves[model.key] = pd.read_csv(folder / "curve.csv")
+        kept = [m for m in (tried if how["alone"] else joined) if m.kept]
+        if kept:
+            folder = pulled(out / f"known_{kept[0].key}", kept[0].fabric, spacing, uncertainty=True)
+            own = pd.read_csv(folder / "uncertainty.csv")
+            together.extend(over_models(name, [curves[m.key] for m in kept], own))
         if folders != [arguments.other]:
             folder = pulled(out / "large", nearest(out), spacing, uncertainty=True)
             known[name] = pd.read_csv(folder / "uncertainty.csv")
-            if curves:
+            if how["alone"]:
                 curves["nearest"] = pd.read_csv(folder / "curve.csv")
-        text.extend([*section(name, folders, report), *of_models(report, tried, curves)])
+        shown = curves if how["alone"] else {}
+        text.extend([*section(name, folders, report), *of_models(report, tried, shown)])
         text.extend(numbers(report))
+        if joined:
+            text.extend([JOINED.format(KEPT), "", *of_joined(joined, curves), ""])
         friction.append(viscous([f for f in folders if f not in arguments.frames], report))
-        if curves:
+        if how["alone"] and "crossover_slip" in curves:
             draw(curves, out / "large_crossover_slip")
         return out, tried
 
@@ -412,7 +502,8 @@ def main() -> None:
     if arguments.frames:
         add("Strips and picture frames", [*arguments.frames, *arguments.strips], alone=False)
     length, width = SIZE
-    text += [f"## {width:g} x {length:g} mm, foretold", "", FORETOLD, "", *large(known), ""]
+    text += [f"## {width:g} x {length:g} mm, foretold", "", FORETOLD.format(KEPT), ""]
+    text += [*large(known, together), ""]
     slipping = next(model for model in tried if model.effects == ("crossover_slip",))
     text += ["## Slip", "", SLIP.format(size=f"{width:g} x {length:g} mm"), ""]
     text += [*of_slip(slipping.fabric, out / "large_crossover_slip"), ""]

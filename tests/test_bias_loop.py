@@ -147,6 +147,7 @@ def test_what_is_pulled_once_is_not_solved_back(strip):
         ("shear_locking", "power 3"),
         pytest.param("crossover_slip", "at a force", marks=pytest.mark.slow),
         pytest.param("tow_uncrimping", "soft, then stiff", marks=pytest.mark.slow),
+        pytest.param("tow_uncrimping", "soft throughout", marks=pytest.mark.slow),
     ],
 )
 def test_slopes_are_differences(effect, label, monkeypatch):

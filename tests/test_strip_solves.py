@@ -24,6 +24,7 @@ GAMMA = np.radians(KNOTS)
 SOFT, STIFF = (Curve.through(k * (0.02 * GAMMA + 0.2 * GAMMA**3)) for k in (1.0, 5.0))
 SLIPPING = {"crossover.slip_limit_N": 0.3, "crossover.translation_N_mm": 10.0}
 CRIMPED = {"tow.crimp_strain": 0.02}
+STRETCHED = {"tow.stiffness.stretch_N_mm": 40.0}
 
 
 def case(changes=None, length=40.0, travel=5.0, width=20.0, **more):
@@ -46,8 +47,8 @@ def same(one, other):
 
 @pytest.mark.parametrize(
     "changes",
-    [{}, CRIMPED, SLIPPING],
-    ids=["pinned", "crimped", "slipping"],
+    [{}, CRIMPED, SLIPPING, STRETCHED],
+    ids=["pinned", "crimped", "slipping", "stretched"],
 )
 def test_a_model_that_is_kept_remembers_nothing(changes):
     """Neither what it did nor what it was: one that is pulled again is like a new one."""

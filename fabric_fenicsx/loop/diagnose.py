@@ -13,7 +13,7 @@ from mpi4py import MPI
 from ..errors import FitError, InputError, SolveError
 from ..inputs.keys import one_of
 from ..output.folder import prepare_folder
-from .fabric import NEAREST, fabric_content, fabric_file, write_fabric
+from .fabric import JOINED, NEAREST, fabric_content, fabric_file, joined_fabrics, write_fabric
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect
 from .inference.experiment import Experiment
@@ -118,6 +118,8 @@ def diagnose(
             diagnosis = diagnose_test(experiment, effects, part)
         except SolveError as error:
             raise _unfitted(kind, error) from error
+        part(0.93, "with other tests")
+        kind.join(experiment, same, diagnosis, [found for found, _, _ in parts], effects)
         part(0.95, "further tests")
         noise = diagnosis.noise_model
         advice = next_tests(
@@ -142,6 +144,10 @@ def diagnose(
         else:
             # That of an earlier diagnosis, which is none of these measurements' any more.
             (folder / NEAREST).unlink(missing_ok=True)
+        for earlier in folder.glob(JOINED.format("*")):
+            earlier.unlink()
+        for name, content in joined_fabrics(_with_measurements(parts, tests), folder):
+            write_fabric(folder, content, JOINED.format(name))
         write_report(folder, parts, report)
     return Found(report, tuple(diagnosis for diagnosis, _, _ in parts), fabric)
 

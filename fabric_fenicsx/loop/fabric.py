@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,15 @@ from .measurement.schema import Measurement
 from .report.content import nearest_model, scatter
 from .report.plausibility import correlation_of
 
-__all__ = ["NEAREST", "fabric_content", "fabric_file", "law_entries", "write_fabric"]
+__all__ = [
+    "JOINED",
+    "NEAREST",
+    "fabric_content",
+    "fabric_file",
+    "joined_fabrics",
+    "law_entries",
+    "write_fabric",
+]
 
 Array = npt.NDArray[np.float64]
 
@@ -47,6 +55,9 @@ BASELINE = {
 
 NEAREST = "fabric_nearest.yaml"
 """The file with models that came nearest and are not accepted."""
+
+JOINED = "fabric_with_{}.yaml"
+"""Files with models that take something from another test, by their effects."""
 
 PLACES = {
     "picture_frame": "crossover.laws",
@@ -152,6 +163,18 @@ def fabric_file(
 ) -> FabricFile:
     """The same as a case takes it; see fabric_content."""
     return FabricFile.model_validate(fabric_content(tests, folder), context={"base": folder})
+
+
+def joined_fabrics(
+    tests: Sequence[tuple[Diagnosis, Sequence[Measurement]]], folder: Path
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Names and contents of files with the models of Diagnosis.joined that were kept."""
+    for d, measurements in tests:
+        for model in d.joined:
+            if model.kept:
+                shown = replace(d, best=model.fit, verdict="unexplained")
+                name = "_".join(["frames", *(e.name for e in model.effects)])
+                yield name, fabric_content([(shown, measurements)], folder, nearest=True)
 
 
 def write_fabric(folder: Path, content: Mapping[str, Any], name: str = FILE) -> None:
@@ -297,9 +320,9 @@ def _add_fitted(
             value, h = model.values[p.name], 1e-4 * model.values[p.name]
             above, below = changes(value + h), changes(value - h)
             for place, changed in changes(value).items():
-                group, _, key = place.partition(".")
+                group, _, key = _of_file(place).partition(".")
                 getattr(part, group)[key] = changed
-            slopes_of = {k: _slope(above[k], below[k], 2.0 * h) for k in above}
+            slopes_of = {_of_file(k): _slope(above[k], below[k], 2.0 * h) for k in above}
             keys[p.name] = {k: slope for k, slope in slopes_of.items() if slope}
             of[p.name] = (effect.name, variant.label)
         if not effect.of_fabric or getattr(variant, "laws", None) is None:
@@ -341,6 +364,11 @@ def _add_fitted(
         shared = [name for name in group.split() if name in names]
         if shared and own_scatter["share"] > 0.0:
             part.specimens.append({"parameters": shared, "test": part.test, **own_scatter})
+
+
+def _of_file(place: str) -> str:
+    """A key of the file for one of a case: the tow's stiffnesses are its own there."""
+    return place.replace("tow.stiffness.", "tow.")
 
 
 def _at_spacing(part: _Part, area: float) -> None:

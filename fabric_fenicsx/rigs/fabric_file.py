@@ -59,8 +59,13 @@ class FoundTowKeys(Keys):
     height_mm: Positive = Field(description="of the section across the sheet")
     C1_MPa: Positive = Field(description="Neo-Hookean constant; E = 6 C1")
     bending_in_plane_Nmm: Positive | None = Field(None, description="as tow.stiffness of a case")
+    stretch_N_mm: Positive | None = Field(None, description="as tow.stiffness of a case")
     bending: list[BendingLawKeys] = Field(default_factory=list, description="as in a case")
     crimp_strain: NotNegative | None = Field(None, description="as in a case; null: the case's")
+
+
+#: Keys of the tow that a case has in ``tow.stiffness``.
+OF_STIFFNESS = ("bending_in_plane_Nmm", "stretch_N_mm")
 
 
 class FoundCrossoverKeys(Keys):
@@ -211,14 +216,14 @@ def with_fabric(case: AnyCase, fabric: FabricFile) -> AnyCase:
     data = case.model_dump()
     tow = data["tow"]
     if fabric.tow is not None:
-        own = fabric.tow.model_dump(exclude={"bending_in_plane_Nmm"}, exclude_none=True)
+        own = fabric.tow.model_dump(exclude=set(OF_STIFFNESS), exclude_none=True)
         tow |= own | {"per_width_mm": fabric.fabric.tow_spacing_mm, "D1_per_MPa": 0.0}
         if tow["bundle"] is not None:
             tow |= {"bundle": None, "section_law": "linear"}
         # What the section says is not said twice.
         stiffness = (tow["stiffness"] or {}) | {"bending_out_of_plane_Nmm": None}
-        if fabric.tow.bending_in_plane_Nmm is not None:
-            stiffness["bending_in_plane_Nmm"] = fabric.tow.bending_in_plane_Nmm
+        given = {name: getattr(fabric.tow, name) for name in OF_STIFFNESS}
+        stiffness |= {name: value for name, value in given.items() if value is not None}
         tow["stiffness"] = stiffness if any(v is not None for v in stiffness.values()) else None
     if fabric.crossover is not None:
         warp, weft = case.spacings

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -15,7 +16,7 @@ from .fitting import Fit
 from .judge import Laboratory
 from .noise import Noise, Whiteness
 
-__all__ = ["Beside", "Candidate", "Diagnosis", "Verdict"]
+__all__ = ["Beside", "Candidate", "Diagnosis", "Joined", "Verdict"]
 
 Flags = npt.NDArray[np.bool_]
 Pair = tuple[str, list[Fit], str, list[Fit]]
@@ -37,6 +38,27 @@ class Beside:
     after: tuple[float, float]
     best: tuple[float, float]
     noise: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joined:
+    """A model with something in it that another test of the fabric found.
+
+    Attributes:
+        effects: beside that.
+        fit: the model.
+        left_out: error of each run foretold from the others, or of parts of a single one.
+        holdout: error of holdout runs; NaN without.
+        kept: whether it is among those that foretell about as well as the best one.
+        middle: of strips, the angle of the middle at the last fitted reading of each run [degrees].
+    """
+
+    effects: tuple[Effect, ...]
+    fit: Fit
+    left_out: float
+    holdout: float
+    kept: bool
+    middle: Mapping[str, float]
 
 
 @dataclass(slots=True)
@@ -87,6 +109,7 @@ class Diagnosis:
         laboratories: where there are several folders, what the others say of each.
         pairs: effects that are not told apart, with the models of each that fit as well.
         of_the_curve: effects that are such a curve, where one was looked for.
+        joined: models with what another test of the fabric found, the best first.
     """
 
     experiment: Experiment
@@ -117,3 +140,4 @@ class Diagnosis:
     laboratories: tuple[Laboratory, ...] = ()
     pairs: list[Pair] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    joined: list[Joined] = field(default_factory=list)

@@ -80,6 +80,8 @@ class Kind:
         options: what only this kind's ``made_up`` takes by name.
         proposals: from measurements of this kind to runs that its rig could do next.
         needs_others: its model takes the fabric that kinds before it found (``take``).
+        join: adds models to a diagnosis that take more from those of other kinds; takes the
+            experiment, its measurements, the diagnosis, the others' and the names of effects.
         scattered: readings lie all over a sheet, on no line.
     """
 
@@ -100,4 +102,5 @@ class Kind:
     options: tuple[str, ...] = ()
     proposals: Callable[[Sequence[Measurement]], list[Proposal]] = lambda measurements: []
     needs_others: bool = False
+    join: Callable[..., None] = lambda *_: None
     scattered: bool = False

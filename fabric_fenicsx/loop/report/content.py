@@ -126,6 +126,12 @@ def test_report(
     }
     if told := getattr(d.experiment, "foretold", None):
         content["foretold"] = told
+    if d.joined:
+        content["joined"] = [
+            _numbers(d, m.fit, m.holdout)
+            | {"error_left_out": m.left_out, "kept": m.kept, "middle_angle_deg": dict(m.middle)}
+            for m in d.joined
+        ]
     if d.others:
         content["errors"] = [content["error"], *_errors(d)]
     numbers: dict[str, Any] = finite(content)

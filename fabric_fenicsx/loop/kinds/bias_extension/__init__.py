@@ -63,4 +63,5 @@ BIAS_EXTENSION = Kind(
     options=("rates", "lengths", "angle_noise"),
     proposals=called_later(f"{__name__}.proposals", "proposals"),
     needs_others=True,
+    join=called_later(f"{__name__}.with_frames", "join"),
 )

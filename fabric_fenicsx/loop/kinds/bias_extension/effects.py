@@ -57,6 +57,15 @@ CRIMP = Parameter(
     amplitude=True,
     meaning="by which tows lengthen as their crimp is drawn out",
 )
+COMPLIANCE = Parameter(
+    "compliance_mm_N",
+    (0.003, 0.01),
+    0.0,
+    0.04,
+    amplitude=True,
+    meaning="strain of the tows by a force per width of fabric",
+    share_of="per_width_force",
+)
 DRAWN = Parameter(
     "drawn_out",
     (0.02, 0.1),
@@ -109,6 +118,13 @@ BIAS_EXTENSION_EFFECTS = (
                 (CRIMP,),
                 changes=lambda strain: {"tow.crimp_strain": strain},
                 solved_at=(0.01, 0.02, 0.03, 0.045, 0.06),
+            ),
+            StripPullVariant(
+                "soft throughout",
+                (COMPLIANCE,),
+                changes=lambda compliance: {"tow.stiffness.stretch_N_mm": 1.0 / compliance},
+                solved_at=(0.002, 0.005, 0.01, 0.02, 0.04),
+                per_force=True,
             ),
         ),
     ),

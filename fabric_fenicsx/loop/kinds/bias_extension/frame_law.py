@@ -28,10 +28,12 @@ from ...inference.effects import Values
 from ..picture_frame.variant import FrameVariant
 
 __all__ = [
+    "FRAME_SHARE",
     "LIKE_THE_FRAME",
     "crossing_laws",
     "foretold",
     "foretold_in_words",
+    "in_thirds",
     "locking",
     "locking_variant",
 ]
@@ -41,6 +43,8 @@ Array = npt.NDArray[np.float64]
 FRAME_SHARE = "of_the_frame"
 #: Label of the form.
 LIKE_THE_FRAME = "as the picture frame has it"
+#: Of the travel.
+THIRDS = ("early", "middle", "late")
 
 
 def crossing_laws(keys: FoundCrossoverKeys) -> tuple[Any, ...]:
@@ -71,16 +75,13 @@ class _Times(TabulatedSpring):
         return self.share * super().moment(at)
 
 
-def locking_variant(gamma: Array, moment: Array) -> FrameVariant | None:
-    """A form of locking with a frame's own curve; None where it does not lock.
+def locking_variant(gamma: Array, curve: Array) -> FrameVariant:
+    """A form of locking with a frame's own curve.
 
     Args:
         gamma: angles [rad], increasing from 0, (n,).
-        moment: of the frame there, per area [N/mm], (n,).
+        curve: locking of the frame there, per area [N/mm], (n,).
     """
-    curve = locking(gamma, moment)
-    if not curve[-1] > 0.0:
-        return None
     share = Parameter(
         FRAME_SHARE,
         (),
@@ -109,31 +110,33 @@ def foretold(expected: Array, observed: Array, D: Array, furthest: Array) -> dic
         furthest: the largest of each reading's run [mm], (n,).
 
     Returns:
-        ``error``: root mean square [N]; ``early`` and ``late``: mean of what is expected over that
-        of what was read in the first third of the travel and in the last.
+        ``error``: root mean square [N]; ``early``, ``middle`` and ``late``: mean of what is
+        expected over that of what was read in each third of the travel.
     """
-    early, late = D < furthest / 3.0, D > 2.0 * furthest / 3.0
+    third = np.minimum(3.0 * D / furthest, 2.0).astype(int)
     return {
         "error": float(np.sqrt(np.mean((expected - observed) ** 2))),
         **{
-            name: float(expected[rows].mean() / observed[rows].mean())
-            for name, rows in (("early", early), ("late", late))
-            if rows.any()
+            name: float(expected[third == k].mean() / observed[third == k].mean())
+            for k, name in enumerate(THIRDS)
+            if (third == k).any()
         },
     }
+
+
+def in_thirds(found: Mapping[str, float]) -> str:
+    """In words what ``foretold`` says."""
+    told = [f"{found[name]:.2g}" for name in THIRDS if name in found]
+    return (
+        f"{found['error']:.2g} N rms, {', '.join(told)} times the force in the thirds of the travel"
+    )
 
 
 def foretold_in_words(found: Mapping[str, float]) -> list[str]:
     """A line of a report on what ``foretold`` says; none where there is nothing."""
     if not found:
         return []
-    told = [f"{found['error']:.2g} N rms"]
-    told += [
-        f"{found[part]:.2g} of the force in the {words} third of the travel"
-        for part, words in (("early", "first"), ("late", "last"))
-        if part in found
-    ]
     return [
         "The law that the picture frame found, whole and with nothing fitted, foretells "
-        f"these strips, pinned, to {', '.join(told)}."
+        f"these strips, pinned, to {in_thirds(found)}."
     ]

@@ -36,7 +36,7 @@ from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
 from ..records import shifted
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
-from .frame_law import crossing_laws, foretold, foretold_in_words, locking_variant
+from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
 from .quantities import first_curve, read_together, strip_of
 from .settled import Correction, Quantity, correction
 from .solved import GROUPS, Part, Solved, SolvedStrips, Wanted, gamma_of, number, of_ways, reached
@@ -126,19 +126,24 @@ class BiasExtension(CrossheadTest):
             return
         laws = crossing_laws(fabric.crossover)
         moments = self._at_knots([FrameVariant("the frame's", (), laws=lambda _: laws)], {}).value
-        form = locking_variant(np.radians(KNOTS), moments)
-        if form is not None:
+        curve = locking(np.radians(KNOTS), moments)
+        if curve[-1] > 0.0:
+            form = locking_variant(np.radians(KNOTS), curve)
             self.effects = [
                 replace(e, variants=(form, *e.variants)) if e.name == "shear_locking" else e
                 for e in self.effects
             ]
         try:
-            self.foretold = self._foretold(Curve.through(moments))
+            self.foretold = self.foretold_by(Curve.through(moments))
         except SolveError as error:
             self._strips.failed["with the picture frame's law"] = str(error)
 
-    def _foretold(self, curve: Curve) -> dict[str, float]:
-        """How forces with a curve that nothing was fitted of meet what was read."""
+    def foretold_by(self, curve: Curve) -> dict[str, float]:
+        """How forces with a curve that nothing was fitted of meet what was read.
+
+        Raises:
+            SolveError: the strips stopped before their end.
+        """
         solved = self._strips.solved({}, curve)
         D, back = self._points["D"].value, self._back
         force = np.stack(
@@ -210,14 +215,14 @@ class BiasExtension(CrossheadTest):
         ]
 
     def _more_shares(self) -> dict[str, float]:
-        """One over the largest force that comes on a tow of the clamps [1/N]."""
-        per_tow = [
-            float(np.abs(run.columns["force_N"]).max())
-            * m.fabric.tow_spacing_mm
-            / run.own["width_mm"]
-            for m, run in self._of_forces()
-        ]
-        return {"per_tow_force": 1.0 / max([*per_tow, 1e-9])}
+        """One over the largest force on a tow of the clamps [1/N], and per width of them [mm/N]."""
+        found = {"per_tow_force": 1e9, "per_width_force": 1e9}
+        for m, run in self._of_forces():
+            per_width = max(float(np.abs(run.columns["force_N"]).max()) / run.own["width_mm"], 1e-9)
+            per_tow = per_width * m.fabric.tow_spacing_mm
+            found["per_tow_force"] = min(found["per_tow_force"], 1.0 / per_tow)
+            found["per_width_force"] = min(found["per_width_force"], 1.0 / per_width)
+        return found
 
     def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
         found = super()._scaled(effect, shares)

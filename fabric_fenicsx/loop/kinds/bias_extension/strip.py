@@ -26,9 +26,10 @@ from ....mechanics.laws.law import Crossing
 from ....mechanics.laws.tabulated import TabulatedSpring
 from ....rigs.bias_extension import BiasExtensionCase, build, clamps, middle_zone, slip_limit
 from ....rigs.cases import SolverKeys
-from ....rigs.common import Session, control
+from ....rigs.common import Session, control, tow_sections
 from ....rigs.crosshead import crosshead, duration
 from ....solving.model import Model
+from ....solving.sections import diagonals
 from ....solving.snapshot import Snapshot
 from ....solving.stepping import Step, Stepper
 from ...measurement.case import measured_case, tow_of
@@ -236,9 +237,10 @@ def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:
     # What its forms do not depend on.
     limit = None if crossover.slip_limit_N is None else 1.0
     crimp = ANY_CRIMP if tow.crimp_strain > 0.0 else 0.0
+    stiffness = tow.stiffness.model_copy(update={"stretch_N_mm": None})
     built = {
         "crossover": crossover.model_copy(update={"slip_limit_N": limit}),
-        "tow": tow.model_copy(update={"crimp_strain": crimp}),
+        "tow": tow.model_copy(update={"crimp_strain": crimp, "stiffness": stiffness}),
         "solver": SolverKeys(),
     }
     strip = _strip(case.model_copy(update=built).model_dump_json())
@@ -317,10 +319,14 @@ class _Strip:
         self._memories = self._model.histories.save()
 
     def put_at_rest(self, case: BiasExtensionCase, curve: Curve) -> None:
-        """Take a curve, a limit of slip and a crimp, and forget what was before."""
+        """Take a curve, a limit of slip, a stretch and a crimp, and forget what was before."""
         model = self._model
         for f, values in self._rest:
             f.x.array[:] = values
+        sections, kind = tow_sections(case, model.net, case.spacings)
+        of_cells = diagonals(sections)[kind[model.net.cell_tow]]
+        disc = model.disc
+        disc.tows.stiffness.x.array[:] = disc.cell_field(disc.forces_space, of_cells).x.array
         model.histories.load(self._memories)
         self._take(curve)
         crossings = model.crossings

@@ -83,9 +83,13 @@ class PictureFrame(CrossheadTest):
         """
         if not self._steady(self.readings.fit):
             return None
+        return OneCurve("shear_angle_rad", "moment_N", *self.shear)
+
+    @property
+    def shear(self) -> tuple[Array, Array]:
+        """Angle [rad] and force over moment per area [mm] at every reading, (n,) each."""
         known = self._kinematics(self._points, {})
-        every = self._at_readings(known["gamma"].value), self._at_readings(known["factor"].value)
-        return OneCurve("shear_angle_rad", "moment_N", *every)
+        return self._at_readings(known["gamma"].value), self._at_readings(known["factor"].value)
 
     def _steady(self, rows: npt.NDArray[np.bool_]) -> bool:
         """Whether some readings are of one way at one speed of the crosshead or of the angle."""
