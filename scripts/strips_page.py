@@ -16,8 +16,6 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +29,6 @@ from fabric_fenicsx.loop.fabric import fabric_content, write_fabric
 from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.kinds.bias_extension.frame_law import FRAME_SHARE
-from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
 from fabric_fenicsx.loop.kinds.bias_extension.with_frames import KEPT
 
 PAGE = Path(__file__).parents[1] / "docs" / "measured_strips.md"
@@ -78,7 +75,7 @@ class Tried:
 
 
 def diagnosed(
-    folders: Sequence[Path], out: Path, effects: Sequence[str], *, alone: bool
+    folders: Sequence[Path], out: Path, effects: Sequence[str]
 ) -> tuple[dict[str, Any], list[Tried]]:
     """The report of folders together, of the strips among them, and the models that were tried.
 
@@ -86,7 +83,6 @@ def diagnosed(
         folders: of measurements.
         out: for what is written.
         effects: names of those to try.
-        alone: the folders are strips; pairs of the effects are tried as well.
     """
     if not (out / "report.json").exists():
         measurements = [ff.read_measurement(folder) for folder in folders]
@@ -95,16 +91,6 @@ def diagnosed(
         strips = [m for m in measurements if m.test == "bias_extension"]
         models: list[Any] = [((), d.baseline, d.holdout_before)]
         models += [((c.effect.name,), c.fit, c.holdout) for c in d.candidates if c.fit is not None]
-        if alone:
-            model = partial(BiasExtension, like=d.experiment)
-            for pair in combinations(effects, 2):
-                other = ff.diagnose(strips, effects=pair, models={"bias_extension": model})
-                (two,) = other.diagnoses
-                best, held = (two.final, two.holdout_after)
-                if two.best is not None:
-                    best, held = two.best, two.holdout_best
-                if len(best.variants) == 2:
-                    models.append((pair, best, held))
         judge = Judge(d.experiment, list(d.experiment.effects))
         left_out = [judge.left_out(fit).error(d.experiment.readings.first) for _, fit, _ in models]
         every: list[Any] = [
@@ -249,7 +235,13 @@ def of_the_other(other: Any, tried: Sequence[Tried], near: Path, out: Path) -> I
     size = run.own["length_mm"], run.own["width_mm"]
     yield row("model", "rms [N]", "of the force, first third", "second", "last")
     yield "|---|---|---|---|---|"
-    files = {model.name: (model.key, model.fabric) for model in tried}
+    files = {
+        model.name if model.share is None else f"frames' locking, {model.name}": (
+            model.key,
+            model.fabric,
+        )
+        for model in tried
+    }
     for name, (key, fabric) in {**files, "**nearest**": ("nearest", near)}.items():
         folder = out / f"other_{key}"
         pulled(folder, fabric, other.fabric.tow_spacing_mm, size, float(D.max()), speed)
@@ -402,9 +394,9 @@ def large(table: Mapping[str, pd.DataFrame], together: Sequence[str]) -> Iterato
         columns = [f"shear_angle_deg{end}" for end in ("", "_fit", "_specimens")]
         cells = zip(*(at_travels(curve, column) for column in columns), strict=True)
         own = (f"{a:.1f} ± {s:.1f} ± {z:.1f}" for a, s, z in cells)
-        yield row(f"{name}, nearest: angle [°]", *own)
+        yield row(f"{name}, least error: angle [°]", *own)
         force = zip(*(at_travels(curve, f"force_N{end}") for end in ("", "_fit")), strict=True)
-        yield row(f"{name}, nearest: force [N]", *(f"{f:.3g} ± {s:.2g}" for f, s in force))
+        yield row(f"{name}, least error: force [N]", *(f"{f:.3g} ± {s:.2g}" for f, s in force))
 
 
 OPENING = """# Published strips, and other strips foretold
@@ -413,11 +405,14 @@ Forces of strips pulled at 45 degrees, read from published figures, each table b
 
     fabric-fenicsx diagnose FOLDER ... --effects {effects}
 
-and written here by `python scripts/strips_page.py`. None of the readings is kept in this
-repository. Bold is the model that was found; where the verdict is *unexplained* it came nearest,
-is not accepted, and what it foretells is no more than its best guess. Models of one effect are
-those of the same diagnosis, pairs those of diagnoses with two of them that took both.
+and written here by `python scripts/strips_page.py`, where picture frames of the fabric are
+diagnosed in the same command. None of the readings is kept in this repository. Bold is the model
+that was found; where the verdict is *unexplained* it came nearest, is not accepted, and what it
+foretells is no more than its best guess. Models of one effect are those of the same diagnosis.
 """
+
+#: How notes on picture frames begin.
+OF_FRAMES = ("The law that the picture frame", "Taken to be", "With it", "Where the readings")
 
 OTHER = """The strip of another laboratory, {size}, of which these models have seen nothing: errors
 of all of its readings, and mean force over that which was read in each third of the travel."""
@@ -431,13 +426,13 @@ FORETOLD = """The mean angle of all crossings whose two tows end in no clamp. No
 this size, or an angle. Bold: the mean of all models of a table above that foretell a strip from the
 others with at most {:g} times the least error, each counted once, ± the standard deviation between
 them, a standard error of the fit and what specimens differ by, taken together; then their span.
-Below that the nearest model of all by itself, with one standard error of the fit and with what
-specimens differ by: that it may not be the right model is in neither."""
+Below that the one with the least error by itself, with one standard error of the fit and with
+what specimens differ by: that it may not be the right model is in neither."""
 
-JOINED = """Locking is what exceeds the frames' least secant stiffness. Here it is the fabric's, in
-a size between those of the laboratories; the rest is each frame's own, and the strips have a law of
-their own at small angles. All is fitted to the strips' forces. Not kept is what foretells a strip
-from the others with more than {:g} times the least error."""
+JOINED = """Locking is what exceeds the least steep piece of a frame's law. Here it is the fabric's,
+in a size within a standard deviation of the laboratories; the rest is each frame's own, and the
+strips have a law of their own at small angles. All is fitted to the strips' forces. Not kept is
+what foretells a strip from the others with more than {:g} times the least error."""
 
 SLIP = """The strip of {size} with `crossover_slip` alone, and where its crossings slipped:"""
 
@@ -461,46 +456,47 @@ def main() -> None:
     known: dict[str, pd.DataFrame] = {}
     together: list[str] = []
 
-    def add(name: str, folders: Sequence[Path], **how: bool) -> tuple[Path, list[Tried]]:
-        out = arguments.out / name.lower().replace(" ", "_")
-        report, tried = diagnosed(folders, out, effects, **how)
-        joined = [model for model in tried if model.share is not None]
-        tried = [model for model in tried if model.share is None]
-        curves: dict[str, pd.DataFrame] = {}
-        for model in tried if how["alone"] else joined:
-            folder = pulled(out / f"large_{model.key}", model.fabric, spacing)
-            curves[model.key] = pd.read_csv(folder / "curve.csv")
-        kept = [m for m in (tried if how["alone"] else joined) if m.kept]
+    def foretold(name: str, out: Path, models: Sequence[Tried]) -> dict[str, pd.DataFrame]:
+        """Curves of the large strip with models; those that are kept count for its angles."""
+        folders = {m.key: pulled(out / f"large_{m.key}", m.fabric, spacing) for m in models}
+        curves = {key: pd.read_csv(folder / "curve.csv") for key, folder in folders.items()}
+        kept = sorted((m for m in models if m.kept), key=lambda m: m.left_out)
         if kept:
-            folder = pulled(out / f"known_{kept[0].key}", kept[0].fabric, spacing, uncertainty=True)
-            own = pd.read_csv(folder / "uncertainty.csv")
-            together.extend(over_models(name, [curves[m.key] for m in kept], own))
-        if folders != [arguments.other]:
-            folder = pulled(out / "large", nearest(out), spacing, uncertainty=True)
+            folder = out / f"known_{kept[0].key}"
+            pulled(folder, kept[0].fabric, spacing, uncertainty=True)
             known[name] = pd.read_csv(folder / "uncertainty.csv")
-            if how["alone"]:
-                curves["nearest"] = pd.read_csv(folder / "curve.csv")
-        shown = curves if how["alone"] else {}
-        text.extend([*section(name, folders, report), *of_models(report, tried, shown)])
-        text.extend(numbers(report))
-        if joined:
-            text.extend([JOINED.format(KEPT), "", *of_joined(joined, curves), ""])
-        friction.append(viscous([f for f in folders if f not in arguments.frames], report))
-        if how["alone"] and "crossover_slip" in curves:
-            draw(curves, out / "large_crossover_slip")
-        return out, tried
+            of_kept = [curves[m.key] for m in kept]
+            together.extend(over_models(name, of_kept, known[name]))
+        return curves
 
-    out, tried = add("Strips alone", arguments.strips, alone=True)
+    out = arguments.out / "together"
+    report, every = diagnosed([*arguments.frames, *arguments.strips], out, effects)
+    tried = [model for model in every if model.share is None]
+    joined = [model for model in every if model.share is not None]
+    curves = foretold("Strips alone", out, tried)
+    curves["nearest"] = pd.read_csv(pulled(out / "large", nearest(out), spacing) / "curve.csv")
+    draw(curves, out / "large_crossover_slip")
+    of_frames = [note for note in report["notes"] if note.startswith(OF_FRAMES)]
+    report["notes"] = [note for note in report["notes"] if note not in of_frames]
+    text += section("Strips alone", arguments.strips, report)
+    text += [*of_models(report, tried, curves), *numbers(report)]
+    friction.append(viscous(arguments.strips, report))
     if arguments.other:
         other = ff.read_measurement(arguments.other)
         own = other.runs[0].own
         size = f"{own['width_mm']:g} x {own['length_mm']:g} mm"
         text += ["## Another laboratory, foretold", "", OTHER.format(size=size), ""]
-        text += [*of_the_other(other, tried, nearest(out), out), ""]
-        add("Another laboratory alone", [arguments.other], alone=False)
+        text += [*of_the_other(other, every, nearest(out), out), ""]
+        alone, of_other = diagnosed([arguments.other], arguments.out / "other", effects)
+        text += section("Another laboratory alone", [arguments.other], alone)
+        text += [*of_models(alone, of_other, {}), *numbers(alone)]
+        friction.append(viscous([arguments.other], alone))
         text += [DASHPOTS.format(*friction), ""]
-    if arguments.frames:
-        add("Strips and picture frames", [*arguments.frames, *arguments.strips], alone=False)
+    if joined:
+        titles = "; ".join(ff.read_measurement(f).title for f in arguments.frames)
+        text += ["## Strips and picture frames", "", f"The same strips with {titles}.", ""]
+        text += [*(f"{note}\n" for note in of_frames), JOINED.format(KEPT), ""]
+        text += [*of_joined(joined, foretold("Strips and picture frames", out, joined)), ""]
     length, width = SIZE
     text += [f"## {width:g} x {length:g} mm, foretold", "", FORETOLD.format(KEPT), ""]
     text += [*large(known, together), ""]

@@ -223,15 +223,18 @@ def test_a_strip_without_readings_is_refused():
         read_together([measured(pulled(force=np.full(29, np.nan)))])
 
 
-def test_locking_is_what_exceeds_the_least_secant_stiffness():
+def test_locking_is_what_exceeds_the_least_steep_piece():
     gamma = np.linspace(0.0, 1.2, 60)
-    assert locking(gamma, 0.3 * gamma + 2.0 * gamma**3) == pytest.approx(2.0 * gamma**3, abs=1e-3)
+    cubic = 2.0 * gamma**3
+    assert locking(gamma, 0.3 * gamma + cubic) == pytest.approx(cubic, abs=0.02 * cubic[-1])
     # Friction under tension at small angles is no part of it.
     hump = 0.05 * np.tanh(gamma / 0.02) + 0.1 * gamma + 3.0 * np.maximum(gamma - 0.6, 0.0) ** 2
     part = locking(gamma, hump)
-    assert part[gamma < 0.5].max() == 0.0 < part[-1] < hump[-1]
-    assert locking(gamma, 0.3 * gamma).max() < 1e-12
-    assert locking_variant(gamma, np.zeros_like(gamma)) is None
+    assert part[gamma < 0.5].max() == 0.0
+    assert part[-1] == pytest.approx(3.0 * 0.6**2, rel=1e-3)
+    assert locking(gamma, 0.3 * gamma).max() == 0.0
+    (share,) = locking_variant(gamma, part).parameters
+    assert share.amplitude and share.lower == 0.0
 
 
 def test_a_strip_is_foretold_by_its_own_law_from_a_picture_frame():
@@ -254,7 +257,8 @@ def test_a_strip_is_foretold_by_its_own_law_from_a_picture_frame():
     (form,) = (v for e in test.effects if e.name == "shear_locking" for v in e.variants[:1])
     assert form.label == LIKE_THE_FRAME
     predicted, slopes = test.predict((form,), values | {"k3_N": 0.0, "of_the_frame": 1.0})
-    assert predicted == pytest.approx(force, abs=0.02 * force.max())
+    # What the least steep piece has of the cube is missing.
+    assert predicted == pytest.approx(force, abs=0.04 * force.max())
     without, _ = test.predict((), values | {"k3_N": 0.0})
     assert slopes["of_the_frame"] == pytest.approx(predicted - without, abs=0.1 * force.max())
 

@@ -2,11 +2,12 @@
 
 A frame stretches its tows, a strip hardly: what the frame reads at small angles, tension and
 friction under it, need not carry over. Where yarns lock it should. With the moment m(γ) of the
-frame and the angle γ* of its least secant stiffness k = min m/γ, locking is what exceeds that,
+frame and the straight piece a + b γ of it that is least steep, about γ*, locking is what exceeds
+that,
 
-    m_lock = m − k γ    beyond γ*,
+    m_lock = m − a − b γ    beyond γ*,
 
-of k1 γ + k3 γ³ all but the first term.
+of a friction, k1 γ and k3 γ³ all but the first two.
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ Array = npt.NDArray[np.float64]
 FRAME_SHARE = "of_the_frame"
 #: Label of the form.
 LIKE_THE_FRAME = "as the picture frame has it"
+#: Length of a straight piece of a law [rad], and the share of it that is none.
+PIECE, ROUNDING = np.radians(10.0), 1e-6
 #: Of the travel.
 THIRDS = ("early", "middle", "late")
 
@@ -57,12 +60,21 @@ def crossing_laws(keys: FoundCrossoverKeys) -> tuple[Any, ...]:
 
 
 def locking(gamma: Array, moment: Array) -> Array:
-    """The part of a frame's moments that locking is, not falling, (n,)."""
-    secant = np.full_like(gamma, np.inf)
-    secant[1:] = moment[1:] / gamma[1:]
-    softest = int(np.argmin(secant))
-    part = np.where(np.arange(len(gamma)) > softest, moment - secant[softest] * gamma, 0.0)
-    return np.asarray(np.maximum.accumulate(np.maximum(part, 0.0)))
+    """The part of a frame's moments that locking is, not falling, (n,).
+
+    Args:
+        gamma: angles [rad], increasing, (n,).
+        moment: there, (n,).
+    """
+    pieces = [
+        np.polynomial.Polynomial.fit(gamma[i:j], moment[i:j], 1)
+        for i, j in enumerate(np.searchsorted(gamma, gamma + PIECE, side="right"))
+        if j > i + 1 and gamma[j - 1] - gamma[i] > 0.5 * PIECE
+    ]
+    line = min(pieces, key=lambda piece: float(piece.deriv()(0.0)))
+    part = np.where(gamma > np.mean(line.domain), moment - line(gamma), 0.0)
+    part[part < ROUNDING * np.abs(moment).max()] = 0.0
+    return np.asarray(np.maximum.accumulate(part))
 
 
 @dataclass(frozen=True)
@@ -87,7 +99,7 @@ def locking_variant(gamma: Array, curve: Array) -> FrameVariant:
         (),
         0.0,
         amplitude=True,
-        meaning="share of what the picture frame's moment has beyond its least secant stiffness",
+        meaning="share of what the picture frame's moment has beyond its least steep piece",
     )
     angles = tuple(gamma.tolist())
 

@@ -43,7 +43,7 @@ from .solved import GROUPS, Part, Solved, SolvedStrips, Wanted, gamma_of, number
 from .strip import FINE_STEPS, KNOTS, Curve, strip_case
 from .terms import strip_terms
 
-__all__ = ["BiasExtension"]
+__all__ = ["BiasExtension", "solved_by"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -246,7 +246,7 @@ class BiasExtension(CrossheadTest):
         right at that place, their derivatives as before. Strips that stop before their end leave
         them as they are.
         """
-        key = _solved_by(variants)
+        key = solved_by(variants)
         changes: dict[str, Any] = {}
         for v in variants:
             if isinstance(v, StripPullVariant) and v.changes is not None:
@@ -451,7 +451,7 @@ class BiasExtension(CrossheadTest):
 
     def _correction(self, variants: Sequence[Variant], travel: Any, quantity: Quantity) -> Varying:
         """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
-        off = self._corrections.get(_solved_by(variants))
+        off = self._corrections.get(solved_by(variants))
         return number(0.0) if off is None else off.at(quantity, travel["D"], self._back)
 
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
@@ -480,7 +480,7 @@ def _backward(D: Array, speed: Array) -> Flags:
     return np.take_along_axis(speed, last, axis=0) < 0.0
 
 
-def _solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:
+def solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:
     """Those that the strips' motion depends on."""
     return frozenset(
         v

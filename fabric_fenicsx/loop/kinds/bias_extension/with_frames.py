@@ -1,10 +1,10 @@
 """Strips and picture frames as one fabric: its locking is shared, what else there is is not.
 
 A frame stretches its tows as it shears them, a strip hardly: the moments of the two are no one's
-moments m(γ) in common. What exceeds the frame's least secant stiffness (see frame_law) is taken to
-be the fabric's, in a size between those of the laboratories; the rest is the frame's own. With that
-locking the strips are fitted anew: their small angles with a law of their own, slip and the
-compliance of tows with what they must be.
+moments m(γ) in common. What exceeds the frame's least steep piece (see frame_law) is taken to be
+the fabric's locking, in a size that laboratories differ by; the rest is the frame's own. With that
+locking the strips are fitted anew: a law of their own, k1 γ + c1 γ̇, has their small angles and none
+of the large ones, and slip and the compliance of tows are what they must be.
 
 Forces hardly tell such models apart, and what strips of one fabric differ by is more than what any
 of them leaves. So all are kept that foretell a strip from the others nearly as well as the best
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, product
 
 import numpy as np
@@ -30,9 +31,10 @@ from ...inference.variances import Variances
 from ...measurement.schema import Measurement
 from ..picture_frame.model import PictureFrame
 from ..picture_frame.variant import FrameVariant
+from .centred import CentredBiasExtension
 from .frame_law import FRAME_SHARE, in_thirds, locking, locking_variant
 from .model import BiasExtension
-from .strip import KNOTS, Curve
+from .strip import KNOTS, NOTHING, Curve
 
 __all__ = ["SharedLocking", "join", "shared_locking", "way_out"]
 
@@ -42,12 +44,21 @@ Law = tuple[Array, Array]
 
 #: Width of the bins that readings of a frame are averaged in [degrees].
 BIN = 2.0
+#: Share of the last moment that locking must make.
+LOCKS = 0.05
 #: Share of the furthest frame's locking that another one must have come to, to tell its size.
 REACHED = 0.1
+#: Standard deviations of laboratories that are believed.
+LEAST_SCATTER, MOST_SCATTER = 0.05, 0.95
+#: Share of an effect that a fit of two begins with.
+LITTLE = 0.1
+#: Parameter of the baseline's spring that would lock too.
+OWN_LOCKING = "k3_N"
 #: Left-out error over the least of all up to which a model is kept. Convention.
 KEPT = 1.5
-#: How often a fit is taken up again with the strips solved where it ended.
-SETTLED = 3
+#: How often strips are solved where a fit ended; what it must have come to, over what there was,
+#: for that to be done again; evaluations of a fit; how often a way that leads nowhere is halved.
+SETTLED, ENOUGH, FAR, SHORTEST = 12, 0.97, 12, 3
 #: Effects by which strips lengthen without shear.
 LENGTHENING = ("crossover_slip", "tow_uncrimping")
 
@@ -60,7 +71,8 @@ class SharedLocking:
         moment: per area [N/mm] at KNOTS, the mean of the laboratories.
         onset: angle beyond which it is more than a hundredth of its largest value [rad].
         shares: of it that each folder has; NaN of those that did not get far enough to tell.
-        least, most: between which it is looked for in strips.
+        least, most: between which it is looked for in strips: a standard deviation of laboratories
+            either way, or what is usual for that.
     """
 
     moment: Array
@@ -101,7 +113,7 @@ def shared_locking(curves: Sequence[Law]) -> SharedLocking | None:
     ends = [float(angle[-1]) for angle, _ in curves]
     furthest = int(np.argmax(ends))
     unit = locking(*curves[furthest])
-    if not unit[-1] > 0.0:
+    if not unit[-1] > LOCKS * curves[furthest][1][-1]:
         return None
     sizes = np.full(len(curves), np.nan)
     for k, (angle, moment) in enumerate(curves):
@@ -119,10 +131,9 @@ def shared_locking(curves: Sequence[Law]) -> SharedLocking | None:
     moment = np.maximum.accumulate(moment)
     onset = float(grid[np.argmax(moment > 0.01 * moment[inside][-1])])
     shares = sizes / mean
-    least, most = 1.0 - CRITERIA.laboratories, 1.0 + CRITERIA.laboratories
-    if len(known) > 1:
-        least, most = float(np.nanmin(shares)), float(np.nanmax(shares))
-    return SharedLocking(moment, onset, tuple(shares.tolist()), least, most)
+    scatter = float(np.std(shares[known], ddof=1)) if len(known) > 1 else CRITERIA.laboratories
+    scatter = float(np.clip(scatter, LEAST_SCATTER, MOST_SCATTER))
+    return SharedLocking(moment, onset, tuple(shares.tolist()), 1.0 - scatter, 1.0 + scatter)
 
 
 def held(known: SharedLocking) -> FrameVariant:
@@ -156,9 +167,12 @@ def join(
     if known is None or not (experiment.readings.fit & experiment.readings.first).any():
         return
     form = held(known)
-    # Strips go with other curves than before: as many are solved as for a diagnosis of their own.
-    anew = BiasExtension(measurements, like=experiment)
+    anew = CentredBiasExtension(measurements, like=experiment)
     anew.readings, anew.effects = experiment.readings, _with(experiment.effects, form)
+    anew.baseline = tuple(
+        replace(p, starts=(0.0,), upper=NOTHING) if p.name == OWN_LOCKING else p
+        for p in anew.baseline
+    )
     experiment.effects = anew.effects
     alone = anew.foretold_by(Curve.through(known.moment))
     d.joined = _weighed(anew, d, _models(anew, d, form, names))
@@ -178,19 +192,24 @@ def _models(
 ) -> list[tuple[tuple[Effect, ...], Fit]]:
     """With none of what lets a strip lengthen without shear, with each, and with both.
 
-    Of each the form that fits best; both begin where each by itself ended.
+    Of each the form that fits best; both begin where the better of them ended, with little of the
+    other one.
     """
     own = [e for e in anew.effects if e.name in LENGTHENING and (names is None or e.name in names)]
     found: dict[tuple[Effect, ...], Fit] = {}
     for count in range(len(own) + 1):
         for effects in combinations(own, count):
             singles = [found.get((e,)) for e in effects]
+            sets: list[tuple[tuple[Variant, ...], Mapping[str, float] | None]]
             if count < 2:
                 sets = [((form, *v), None) for v in product(*(e.variants for e in effects))]
             elif all(singles):
-                forms = (form, *(f.variants[-1] for f in singles if f is not None))
-                start = {k: v for f in singles if f is not None for k, v in f.values.items()}
-                sets = [(forms, start)]
+                better, other = sorted(
+                    (f for f in singles if f is not None), key=lambda f: f.sum_of_squares
+                )
+                (little,) = other.variants[-1].parameters
+                start = {little.name: LITTLE * other.values[little.name], **better.values}
+                sets = [((*better.variants, other.variants[-1]), start)]
             else:
                 continue
             fits = [_fitted(anew, d, forms, start) for forms, start in sets]
@@ -214,26 +233,51 @@ def _fitted(
     nearest = d.final if d.best is None else d.best
     usual = max(nearest.variances.scatter.values(), default=0.0)
     groups = groups_of(anew, forms)
-    scatter = {g: nearest.variances.scatter.get(g, usual) for g in groups}
+    scatter = {g: nearest.variances.scatter.get(g, usual) for g in groups if g != OWN_LOCKING}
     variances = Variances(nearest.variances.noise, scatter)
-    baseline = {p.name: d.baseline.values[p.name] for p in anew.baseline}
+    baseline = {p.name: min(d.baseline.values[p.name], p.upper) for p in anew.baseline}
     rows = d.baseline.used
     starts = [
         baseline | {name: value for own in grid for name, value in own.items()}
         for grid in product(*(v.grid(amplitudes=True) for v in forms))
     ]
+    again = partial(fit, anew, forms, used=rows, variances=variances)
+
+    def solved(values: Mapping[str, float], deviations: Mapping[str, Array]) -> Fit:
+        """The model as it is there."""
+        anew.settle(forms, values)
+        return again(values, deviations=deviations, evaluations=1)
+
     try:
-        tried = [
-            fit(anew, forms, one, rows, variances, evaluations=CRITERIA.first_look)
-            for one in (starts if start is None else [start])
-        ]
-        found = min(tried, key=lambda model: model.sum_of_squares)
+        tried = [solved(one, {}) for one in (starts if start is None else [start])]
+        best, converged, shorter = min(tried, key=lambda m: m.sum_of_squares), False, 0
+        anew.settle(forms, best.values)
+        there = best
         for _ in range(SETTLED):
-            anew.settle(forms, found.values)
-            found = fit(anew, forms, found.values, rows, variances, deviations=found.deviations)
+            there = again(there.values, deviations=there.deviations, evaluations=FAR)
+            there = solved(*_between(best, there, 0.5**shorter))
+            if there.sum_of_squares < best.sum_of_squares:
+                converged = there.sum_of_squares > ENOUGH * best.sum_of_squares
+                best, shorter = there, 0
+            else:
+                shorter, there = shorter + 1, best
+                anew.settle(forms, best.values)
+            if converged or shorter > SHORTEST:
+                break
     except SolveError:
         return None
-    return found
+    return replace(best, converged=converged)
+
+
+def _between(one: Fit, other: Fit, share: float) -> tuple[dict[str, float], dict[str, Array]]:
+    """Parameters and deviations so far on the way from a model to another one."""
+    values = {n: v + share * (other.values[n] - v) for n, v in one.values.items()}
+    own = one.deviations
+    nothing = np.zeros(len(one.readings.specimens))
+    deviations = {
+        g: (1.0 - share) * own.get(g, nothing) + share * d for g, d in other.deviations.items()
+    }
+    return values, deviations
 
 
 def _weighed(
@@ -268,8 +312,8 @@ def _in_words(
     onset = np.degrees(known.onset)
     yield (
         f"Taken to be the fabric's is what the picture frames lock with, beyond {onset:.0f}°, "
-        f"{known.least:.2g} to {known.most:.2g} times their mean, as laboratories differ. By "
-        f"itself, with nothing fitted, that foretells the strips to {in_thirds(alone)}."
+        f"{known.least:.2g} to {known.most:.2g} times their mean, as laboratories differ. That "
+        f"mean by itself, with nothing fitted, foretells the strips, pinned, to {in_thirds(alone)}."
     )
     for model in models:
         share = model.fit.values[FRAME_SHARE]
