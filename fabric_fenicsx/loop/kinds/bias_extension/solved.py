@@ -46,6 +46,8 @@ GROUPS = 24
 NEAR = 0.35
 #: How often a strip is solved anew, at most, for each kind of motion.
 MOST = 4
+#: Points of a step at which what is not the work of the crossings' curve is known.
+BETWEEN = 6
 #: Travels at which forces of strips are compared, and angles at which their work is summed.
 TRAVELS, ANGLES = 20, 480
 
@@ -367,12 +369,16 @@ def _way(path: StripPath, group: npt.NDArray[np.int64], curve: Curve) -> Way:
     area = np.bincount(group, path.area, GROUPS).astype(np.float64)
     gamma = np.stack([np.bincount(group, path.area * row, GROUPS) / area for row in path.gamma])
     of_travel = PchipInterpolator(path.travel, gamma)
-    slope = of_travel(path.travel, 1)
-    work = np.sum(area * slope * curve(gamma, path.speed * slope), axis=1)
+    # Between its steps too the force is that of the strip: slopes of the angles are not smooth.
+    count = BETWEEN * (len(path.travel) - 1) + 1
+    at = np.interp(np.arange(count) / BETWEEN, np.arange(len(path.travel)), path.travel)
+    slope = of_travel(at, 1)
+    work = np.sum(area * slope * curve(of_travel(at), path.speed * slope), axis=1)
+    force = PchipInterpolator(path.travel, path.force)(at)
     return Way(
         area,
         of_travel,
-        PchipInterpolator(path.travel, path.force - work),
+        PchipInterpolator(at, force - work),
         PchipInterpolator(path.travel, path.middle),
         path.speed,
         None if path.back is None else _way(path.back, group, curve.back or curve),
