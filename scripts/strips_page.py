@@ -23,6 +23,7 @@ import numpy as np
 import pandas as pd
 import yaml
 from matplotlib.figure import Figure
+from measured_page import number, table
 
 import fabric_fenicsx as ff
 from fabric_fenicsx.loop.fabric import fabric_content, write_fabric
@@ -30,6 +31,8 @@ from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.kinds.bias_extension.frame_law import FRAME_SHARE
 from fabric_fenicsx.loop.kinds.bias_extension.with_frames import KEPT
+
+Cells = tuple[str, ...]
 
 PAGE = Path(__file__).parents[1] / "docs" / "measured_strips.md"
 PICTURE = PAGE.parent / "images" / "measured_strips.png"
@@ -166,9 +169,9 @@ def pulled(
     return folder
 
 
-def row(*cells: Any) -> str:
-    """A row of a table."""
-    return "| " + " | ".join(c if isinstance(c, str) else f"{c:.3g}" for c in cells) + " |"
+def cells(*values: Any) -> Cells:
+    """Of a row: text, or numbers with three digits."""
+    return tuple(v if isinstance(v, str) else number(v) for v in values)
 
 
 def parameters(report: dict[str, Any]) -> str:
@@ -193,7 +196,7 @@ def angles(table: pd.DataFrame) -> str:
 
 def of_models(
     report: dict[str, Any], tried: Sequence[Tried], curves: Mapping[str, pd.DataFrame]
-) -> Iterator[str]:
+) -> Iterator[Cells]:
     """Errors of each model, fitted and held out, and the angles of the large strip with it."""
     runs = [run for m in report["measurements"] for run in m["runs"]]
     held = [run["label"] or run["file"] for run in runs if run["role"] == "holdout"]
@@ -201,40 +204,37 @@ def of_models(
     places = ", ".join(f"{t:g}" for t in TRAVELS)
     columns = ["model", "fitted, rms [N]", "each left out [N]", f"{what} [N]"]
     columns += [f"{SIZE[1]:g} x {SIZE[0]:g} mm: angle [°] at {places} mm"] if curves else []
-    yield row(*columns)
-    yield "|---" * len(columns) + "|"
+    yield cells(*columns)
     for model in tried:
         shown = [angles(curves[model.key])] if model.key in curves else []
-        yield row(model.name, model.fit, model.left_out, model.holdout, *shown)
+        yield cells(model.name, model.fit, model.left_out, model.holdout, *shown)
     best = report["best"] or report["model"]
     if best["effects"]:
         names = " + ".join(f"`{e['name']}` ({e['variant']})" for e in best["effects"])
         shown = [angles(curves["nearest"])] if "nearest" in curves else []
-        yield row(f"**{names}**", best["error_fit"], "", best["error_holdout"], *shown)
+        yield cells(f"**{names}**", best["error_fit"], "", best["error_holdout"], *shown)
 
 
-def of_joined(joined: Sequence[Tried], curves: Mapping[str, pd.DataFrame]) -> Iterator[str]:
+def of_joined(joined: Sequence[Tried], curves: Mapping[str, pd.DataFrame]) -> Iterator[Cells]:
     """The models with the frames' locking, and the angles of the large strip with each."""
     places = ", ".join(f"{t:g}" for t in TRAVELS)
     large = f"{SIZE[1]:g} x {SIZE[0]:g} mm: angle [°] at {places} mm"
     errors = "fitted, rms [N]", "each left out [N]", "held out [N]"
-    yield row("with the frames' locking", "share of it", *errors, large)
-    yield "|---" * 6 + "|"
+    yield cells("with the frames' locking", "share of it", *errors, large)
     for model in joined:
         name = model.name if model.effects else "pinned"
         told = model.share, model.fit, model.left_out, model.holdout
         shown = angles(curves[model.key]) if model.key in curves else ""
-        yield row(name if model.kept else f"{name}: not kept", *told, shown)
+        yield cells(name if model.kept else f"{name}: not kept", *told, shown)
 
 
-def of_the_other(other: Any, tried: Sequence[Tried], near: Path, out: Path) -> Iterator[str]:
+def of_the_other(other: Any, tried: Sequence[Tried], near: Path, out: Path) -> Iterator[Cells]:
     """How the strips' models meet another laboratory's strip, of which they have seen nothing."""
     (run,) = other.runs
     D, force = run.columns["displacement_mm"], run.columns["force_N"]
     speed = 60.0 * float((D[-1] - D[0]) / np.ptp(run.columns["time_s"]))
     size = run.own["length_mm"], run.own["width_mm"]
-    yield row("model", "rms [N]", "of the force, first third", "second", "last")
-    yield "|---|---|---|---|---|"
+    yield cells("model", "rms [N]", "of the force, first third", "second", "last")
     files = {
         model.name if model.share is None else f"frames' locking, {model.name}": (
             model.key,
@@ -250,7 +250,7 @@ def of_the_other(other: Any, tried: Sequence[Tried], near: Path, out: Path) -> I
         expected = np.interp(D, *rest)
         third = np.minimum(3.0 * D / D.max(), 2.999).astype(int)
         shares = [expected[third == k].mean() / force[third == k].mean() for k in range(3)]
-        yield row(name, float(np.sqrt(np.mean((expected - force) ** 2))), *map(float, shares))
+        yield cells(name, float(np.sqrt(np.mean((expected - force) ** 2))), *map(float, shares))
 
 
 def slip(folder: Path, limit: float) -> tuple[float, float, float, pd.DataFrame]:
@@ -267,8 +267,8 @@ def slip(folder: Path, limit: float) -> tuple[float, float, float, pd.DataFrame]
     results = ff.read_results(folder)
     curve = pd.read_csv(folder / "curve.csv")
     strip = ff.BiasStrip(*SIZE)
-    for number, (_, line) in zip(results.steps, curve.iterrows(), strict=True):
-        net, state, _ = results.at(number)
+    for step, (_, line) in zip(results.steps, curve.iterrows(), strict=True):
+        net, state, _ = results.at(step)
         warp, weft = net.crossings.T
         size = np.linalg.norm(state.displacement[weft] - state.displacement[warp], axis=1)
         if size.max() > limit + SLIPPED:
@@ -281,26 +281,24 @@ def slip(folder: Path, limit: float) -> tuple[float, float, float, pd.DataFrame]
     return np.nan, np.nan, np.nan, curve
 
 
-def of_slip(fabric: Path, folder: Path) -> Iterator[str]:
+def of_slip(fabric: Path, folder: Path) -> list[str]:
     """Where and when crossings slip, and by how much."""
     keys = yaml.safe_load(fabric.read_text())["crossover"]
     limit, stiffness = keys["slip_limit_N"], keys.get("translation_N_mm", 100.0)
     travel, angle, off, curve = slip(folder, limit / stiffness)
     columns = ("angle [°]", "slip, largest [mm]", "on the free edges [mm]", "mean [mm]")
     names = ("shear_angle_deg", "largest_slip_mm", "edge_slip_mm", "mean_slip_mm")
-    yield row("travel [mm]", *(f"{t:g}" for t in TRAVELS))
-    yield "|---" * (1 + len(TRAVELS)) + "|"
-    for column, name in zip(columns, names, strict=True):
-        yield row(column, *(f"{v:.3g}" for v in at_travels(curve, name)))
-    yield ""
+    rows = [cells("travel [mm]", *(f"{t:g}" for t in TRAVELS))]
+    rows += [
+        cells(column, *at_travels(curve, name)) for column, name in zip(columns, names, strict=True)
+    ]
+    when = f"With its limit of {limit:.2g} N per crossing none slips."
     if np.isfinite(travel):
-        yield (
+        when = (
             f"With its limit of {limit:.2g} N per crossing the first one slips at {travel:.0f} mm, "
             f"where the middle is sheared by {angle:.0f}°, {off:.0f} mm from a border of the zones."
         )
-    else:
-        yield f"With its limit of {limit:.2g} N per crossing none slips."
-    yield REPORTED
+    return [*table(*rows), when, REPORTED]
 
 
 def viscous(folders: Sequence[Path], report: dict[str, Any]) -> float:
@@ -360,10 +358,10 @@ def section(name: str, folders: Sequence[Path], report: dict[str, Any]) -> list[
 def numbers(report: dict[str, Any]) -> list[str]:
     """The noise and the numbers of the nearest model."""
     noise = report["error"]["noise"]
-    return ["", f"A reading scatters by {noise:.2g} N. {parameters(report)}.", ""]
+    return [f"A reading scatters by {noise:.2g} N. {parameters(report)}.", ""]
 
 
-def over_models(name: str, curves: Sequence[pd.DataFrame], own: pd.DataFrame) -> Iterator[str]:
+def over_models(name: str, curves: Sequence[pd.DataFrame], own: pd.DataFrame) -> Iterator[Cells]:
     """The large strip by all models that were kept, and how far they are apart.
 
     Args:
@@ -375,28 +373,27 @@ def over_models(name: str, curves: Sequence[pd.DataFrame], own: pd.DataFrame) ->
     errors = [at_travels(own, f"shear_angle_deg_{end}") for end in ("fit", "specimens")]
     std = np.sqrt(np.var(angle, axis=0) + np.sum(np.square(errors), axis=0))
     mean = angle.mean(axis=0)
-    yield row(
+    yield cells(
         f"**{name}: angle [°]**", *(f"{a:.1f} ± {s:.1f}" for a, s in zip(mean, std, strict=True))
     )
     span = zip(angle.min(axis=0), angle.max(axis=0), strict=True)
-    yield row(f"{name}: least and most [°]", *(f"{a:.1f} to {b:.1f}" for a, b in span))
+    yield cells(f"{name}: least and most [°]", *(f"{a:.1f} to {b:.1f}" for a, b in span))
 
 
-def large(table: Mapping[str, pd.DataFrame], together: Sequence[str]) -> Iterator[str]:
+def large(known: Mapping[str, pd.DataFrame], together: Sequence[Cells]) -> Iterator[Cells]:
     """The large strip with all models, and with the nearest ones, and how well these know it."""
     length, width = SIZE
     formula = ff.BiasStrip(length, width).angle(np.array(TRAVELS))
-    yield row("travel [mm]", *(f"{t:g}" for t in TRAVELS))
-    yield "|---" * (1 + len(TRAVELS)) + "|"
-    yield row("classical formula, angle [°]", *(f"{np.degrees(a):.1f}" for a in formula))
+    yield cells("travel [mm]", *(f"{t:g}" for t in TRAVELS))
+    yield cells("classical formula, angle [°]", *(f"{np.degrees(a):.1f}" for a in formula))
     yield from together
-    for name, curve in table.items():
+    for name, curve in known.items():
         columns = [f"shear_angle_deg{end}" for end in ("", "_fit", "_specimens")]
-        cells = zip(*(at_travels(curve, column) for column in columns), strict=True)
-        own = (f"{a:.1f} ± {s:.1f} ± {z:.1f}" for a, s, z in cells)
-        yield row(f"{name}, least error: angle [°]", *own)
+        every = zip(*(at_travels(curve, column) for column in columns), strict=True)
+        own = (f"{a:.1f} ± {s:.1f} ± {z:.1f}" for a, s, z in every)
+        yield cells(f"{name}, least error: angle [°]", *own)
         force = zip(*(at_travels(curve, f"force_N{end}") for end in ("", "_fit")), strict=True)
-        yield row(f"{name}, least error: force [N]", *(f"{f:.3g} ± {s:.2g}" for f, s in force))
+        yield cells(f"{name}, least error: force [N]", *(f"{f:.3g} ± {s:.2g}" for f, s in force))
 
 
 OPENING = """# Published strips, and other strips foretold
@@ -454,7 +451,7 @@ def main() -> None:
     text = [OPENING.format(effects=arguments.effects)]
     friction: list[float] = []
     known: dict[str, pd.DataFrame] = {}
-    together: list[str] = []
+    together: list[Cells] = []
 
     def foretold(name: str, out: Path, models: Sequence[Tried]) -> dict[str, pd.DataFrame]:
         """Curves of the large strip with models; those that are kept count for its angles."""
@@ -479,27 +476,27 @@ def main() -> None:
     of_frames = [note for note in report["notes"] if note.startswith(OF_FRAMES)]
     report["notes"] = [note for note in report["notes"] if note not in of_frames]
     text += section("Strips alone", arguments.strips, report)
-    text += [*of_models(report, tried, curves), *numbers(report)]
+    text += [*table(*of_models(report, tried, curves)), *numbers(report)]
     friction.append(viscous(arguments.strips, report))
     if arguments.other:
         other = ff.read_measurement(arguments.other)
         own = other.runs[0].own
         size = f"{own['width_mm']:g} x {own['length_mm']:g} mm"
         text += ["## Another laboratory, foretold", "", OTHER.format(size=size), ""]
-        text += [*of_the_other(other, every, nearest(out), out), ""]
+        text += table(*of_the_other(other, every, nearest(out), out))
         alone, of_other = diagnosed([arguments.other], arguments.out / "other", effects)
         text += section("Another laboratory alone", [arguments.other], alone)
-        text += [*of_models(alone, of_other, {}), *numbers(alone)]
+        text += [*table(*of_models(alone, of_other, {})), *numbers(alone)]
         friction.append(viscous([arguments.other], alone))
         text += [DASHPOTS.format(*friction), ""]
     if joined:
         titles = "; ".join(ff.read_measurement(f).title for f in arguments.frames)
         text += ["## Strips and picture frames", "", f"The same strips with {titles}.", ""]
         text += [*(f"{note}\n" for note in of_frames), JOINED.format(KEPT), ""]
-        text += [*of_joined(joined, foretold("Strips and picture frames", out, joined)), ""]
+        text += table(*of_joined(joined, foretold("Strips and picture frames", out, joined)))
     length, width = SIZE
     text += [f"## {width:g} x {length:g} mm, foretold", "", FORETOLD.format(KEPT), ""]
-    text += [*large(known, together), ""]
+    text += table(*large(known, together))
     slipping = next(model for model in tried if model.effects == ("crossover_slip",))
     text += ["## Slip", "", SLIP.format(size=f"{width:g} x {length:g} mm"), ""]
     text += [*of_slip(slipping.fabric, out / "large_crossover_slip"), ""]
