@@ -17,6 +17,7 @@ from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.loop.report.discovered import _shortest
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw
 from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw, shape_of
+from fabric_fenicsx.rigs.cases import CrossoverKeys
 
 STEP = 0.5
 RANGES = {
@@ -130,6 +131,44 @@ def test_bases():
     for base, moments in expected.items():
         law = ShapedLaw(base, **one, k1=2.0, k3=5.0, stick_angle=0.2)
         assert marched(law, PATH)[0] == pytest.approx(moments), base
+
+
+def test_a_state_of_rest_follows_the_largest_angle():
+    """By f = 0.5 |γ|_max to the side it was on: M = e(γ − s f) − e(γ) with e = 2 γ + 5 γ³."""
+    law = ShapedLaw("rest", "largest_angle", reach=1.0, coefficients=(0.5,), k1=2.0, k3=5.0)
+    gamma = np.array([0.1, 0.3, 0.0, -0.2, -0.4, 0.2])
+    largest, side = [0.1, 0.3, 0.3, 0.3, 0.4, 0.4], [1.0, 1.0, 1.0, 1.0, -1.0, -1.0]
+
+    def spring(angle):
+        return 2.0 * angle + 5.0 * angle**3
+
+    shifted = spring(gamma - 0.5 * np.multiply(largest, side)) - spring(gamma)
+    assert marched(law, gamma)[0] == pytest.approx(shifted)
+
+
+def test_a_state_of_rest_is_an_angle_in_a_net():
+    """Shares and angles stay what they are, moments per area are times the area."""
+    numbers = {"law": "shaped", "variable": "path", "reach": 1.0, "coefficients": [0.5]}
+    numbers |= {"shape": "spline", "k1_N_mm": 2.0}
+    bases = [numbers | {"base": base} for base in ("rest", "odd")]
+    rest, odd = (keys.build(25.0) for keys in CrossoverKeys.model_validate({"laws": bases}).laws)
+    assert tuple(rest.coefficients) == (0.5,) and rest.k1 == 50.0
+    assert tuple(odd.coefficients) == (12.5,)
+
+
+def test_pieces_of_a_spline_lie_where_readings_are():
+    """On both sides of 0, C¹, and each coefficient acts beyond its knot alone."""
+    ends, h = (-1.0, 0.5), 1e-6
+
+    def f(x, *c):
+        return float(as_ufl(shape_of("spline", c, as_ufl(x), ends=ends)))
+
+    # Four pieces: knots at -0.625, -0.25 and 0.125.
+    for k, (knot, outside) in enumerate([(-0.625, -1.0), (-0.25, -1.0), (0.125, 0.5)]):
+        only = np.eye(5)[2 + k]
+        assert f(knot, *only) == f(0.0, *only) == 0.0
+        assert f(outside, *only) == pytest.approx((outside - knot) ** 2)
+        assert abs(f(knot + h, *only) - f(knot - h, *only)) < 1e-9
 
 
 def test_terms_cover_the_contract():
