@@ -10,6 +10,9 @@ from ufl import as_ufl
 
 from fabric_fenicsx.inputs.python_file import classes_of, run_file
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
+from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.noise import Noise
+from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.picture_frame import PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.terms import terms
@@ -220,8 +223,12 @@ def travels(*corners):
     return gamma, FRAME * (2 * np.cos(theta) - math.sqrt(2.0))
 
 
-def write(folder, wear):
-    """Two fitted runs and one held out; of the elastic moment, wear (1 − e^(−path/0.6)) is lost."""
+def write(folder, wear, permanent=0.0, guide=0.0):
+    """Two fitted runs and one held out.
+
+    Of the elastic moment, wear (1 − e^(−path/0.6)) is lost, its state of rest is at
+    ``permanent`` max(γ_max − 0.2, 0), and a guide rubs with ``guide`` [N] at 25 ± 8 mm.
+    """
     folder.mkdir(parents=True)
     rng = np.random.default_rng(5)
     runs = {
@@ -235,8 +242,11 @@ def write(folder, wear):
         time = np.arange(len(gamma), dtype=float)
         rate = np.gradient(gamma)
         path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(gamma)))])
-        m = (K1 * gamma + K3 * gamma**3) * (1.0 - wear * (1.0 - np.exp(-path / 0.6))) + C1 * rate
+        rest = permanent * np.maximum(np.maximum.accumulate(gamma) - 0.2, 0.0)
+        elastic = K1 * (gamma - rest) + K3 * (gamma - rest) ** 3
+        m = elastic * (1.0 - wear * (1.0 - np.exp(-path / 0.6))) + C1 * rate
         force = m * FABRIC**2 / (FRAME * np.sin(np.pi / 4 - gamma / 2))
+        force = force + guide * np.sign(np.gradient(D)) * np.exp(-(((D - 25.0) / 8.0) ** 2))
         force = force + NOISE * rng.standard_normal(len(force))
         table = np.column_stack([time, D, force])
         head = "time_s,displacement_mm,force_N"
@@ -324,6 +334,41 @@ def test_the_file_is_the_term(worn, tmp_path):
             memory[k].update(new)
         assert values[0] == pytest.approx(area * values[1], rel=1e-9, abs=1e-12)
         before = gamma
+
+
+@pytest.mark.parametrize(
+    ("put_in", "term", "truth"),
+    [
+        (
+            {"permanent": 0.5},
+            "rest_moment_of_largest_angle",
+            lambda x: 0.5 * np.maximum(x - 0.2, 0.0),
+        ),
+        (
+            {"guide": 2.0},
+            "reading_of_displacement_and_direction",
+            lambda x: 2.0 * np.exp(-(((x - 25.0) / 8.0) ** 2)),
+        ),
+    ],
+)
+def test_the_right_term_leaves_noise(tmp_path, put_in, term, truth):
+    """In runs held out too, and its shape is the one put in; without it much is left."""
+    experiment = PictureFrame([read_measurement(write(tmp_path / "set", 0.0, **put_in))])
+    (effect,) = (t for t in experiment.terms if t.name == term)
+    variant = next(v for v in reversed(effect.variants) if "coefficients" in v.label)
+    rows, holdout = experiment.readings.fit, experiment.readings.holdout
+    white = Variances(Noise(NOISE))
+    base = {"k1_N": K1, "k3_N": K3, "c1_N_s": C1}
+    without = fit(experiment, (), base, rows, white)
+    found = fit(
+        experiment, (variant,), base | {p.name: 1e-3 for p in variant.parameters}, rows, white
+    )
+    assert without.rms(rows) > 3.0 * NOISE
+    assert found.rms(rows) < 1.5 * NOISE and found.rms(holdout) < 1.5 * NOISE
+    shape = variant.shape
+    x = np.linspace(0.02, 0.98, 25)
+    value = [float(as_ufl(shape.value(found.values, as_ufl(float(one))))) for one in x]
+    assert np.abs(value - truth(shape.reach * x)).max() < 0.1 * truth(shape.reach * x).max()
 
 
 def test_two_terms_of_the_travel_add(tmp_path):
