@@ -58,7 +58,7 @@ OWN_LOCKING = "k3_N"
 KEPT = 1.5
 #: How often strips are solved where a fit ended; what it must have come to, over what there was,
 #: for that to be done again; evaluations of a fit; how often a way that leads nowhere is halved.
-SETTLED, ENOUGH, FAR, SHORTEST = 12, 0.97, 12, 3
+SETTLED, ENOUGH, FAR, SHORTEST = 6, 0.95, 12, 2
 #: Effects by which strips lengthen without shear.
 LENGTHENING = ("crossover_slip", "tow_uncrimping")
 
