@@ -138,16 +138,10 @@ def test_a_model_that_was_settled_is_right_with_its_derivatives():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("changes", "true"),
-    [
-        ({"tow.stiffness.stretch_N_mm": 25.0}, "tow_uncrimping"),
-        ({"crossover.slip_limit_N": 0.35, "crossover.translation_N_mm": 10.0}, "crossover_slip"),
-    ],
-)
-def test_the_middle_of_strips_is_found_with_frames(changes, true, tmp_path):
+def test_the_middle_of_soft_strips_is_found_with_frames(tmp_path):
     """The truth is among the models that are kept, and the angles of the best are its own."""
-    measured, angles = strips(changes)
+    true = "tow_uncrimping"
+    measured, angles = strips({"tow.stiffness.stretch_N_mm": 25.0})
     found = diagnose(
         [frame(1.3), frame(0.8), measured],
         tmp_path,
