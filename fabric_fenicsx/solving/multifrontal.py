@@ -1,8 +1,8 @@
-"""Cholesky's factorisation of symmetric matrices of 6 × 6 blocks, front by front.
+"""Factorisation of symmetric matrices of 6 × 6 blocks, front by front.
 
 The order of elimination is that of a nested dissection by places, whose parts become the fronts
-(multifrontal.c, where the method is). A factorisation that takes any symmetric or general matrix
-has to look for pivots and knows nothing of blocks; a net's tangent is nearly always definite.
+(multifrontal.c, where the method is). A factorisation that takes any symmetric matrix has to look
+for pivots and knows nothing of blocks; a net's tangent is definite, or nearly so.
 """
 
 from __future__ import annotations
@@ -22,8 +22,12 @@ Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
 #: What multifrontal.c takes of BLAS and LAPACK, in the order of its arguments.
-FACTORISING = ("dsyrk", "dtrsm", "dpotrf")
+FACTORISING = ("dsyrk", "dtrsm")
 SOLVING = ("dgemv", "dtrsv")
+
+#: How large squares of the factor's entries may be, relative to the matrix' diagonal in their row;
+#: at most 1 where the matrix is definite. So many digits may be lost.
+GROWTH = 1e6
 
 
 def blas_known() -> bool:
@@ -53,6 +57,9 @@ class Fronts:
         edge: Integers,
     ) -> None:
         self._lib, self._ffi = functions.lib, functions.ffi
+        self._L: Array
+        self._stack: Array
+        self._room: Array
         n = len(points)
         self.edge = edge
         pairs = np.column_stack(pattern)
@@ -117,22 +124,34 @@ class Fronts:
             (high - first[at])[by_part],
         )
         self.entries = int(self._panel[-1])
-        self._L = np.zeros(self.entries)
-        self._stack = np.zeros(_highest(np.diff(row), children))
         self._base = np.zeros(2 * (count + 1), dtype=np.int64)
-        self._room = np.zeros(BLOCK * int(heights.max(initial=0)))
+        self._sign = np.ones(BLOCK * len(self._order))
+        # Of the last hardly more is ever used than a front is high.
+        largest = BLOCK**2 * int((nodes * heights).max(initial=0))
+        self._sizes = self.entries, _highest(np.diff(row), children), largest
+        self.release()
+        of_block = np.flatnonzero(i == j)
+        self._diagonal = of_block[np.argsort(i[of_block])]
 
     def factorise(self, blocks: Array) -> bool:
-        """Factorise, but for the edge; whether the matrix is definite.
+        """Factorise, but for the edge; whether that can be done without looking for pivots.
 
         Args:
             blocks: those of the pattern, by rows, (n_blocks, 6, 6).
         """
+        if not len(self._L):
+            self._L, self._stack, self._room = (np.zeros(size) for size in self._sizes)
+        diagonal = np.abs(np.diagonal(blocks[self._diagonal], axis1=1, axis2=2))
         failed = self._call(
             "factorise", len(self._own) - 1, self._own, self._row, *self._fronts, self._leave,
-            blocks, self._L, self._stack, self._base, *map(blas, FACTORISING),
+            blocks, np.ascontiguousarray(diagonal), GROWTH, self._below,
+            self._L, self._sign, self._stack, self._base, self._room, *map(blas, FACTORISING),
         )  # fmt: skip
-        return not failed
+        return failed >= 0
+
+    def release(self) -> None:
+        """Give back the factor."""
+        self._L, self._stack, self._room = (np.zeros(0) for _ in range(3))
 
     @property
     def left(self) -> Array:
@@ -150,9 +169,10 @@ class Fronts:
 
     def _pass(self, name: str, x: Array) -> None:
         ordered = np.ascontiguousarray(x[:, self._order])
+        factor = (self._L, self._sign) if name == "recover" else (self._L,)
         self._call(
             name, len(self._own) - 1, self._own, self._row, self._below, self._panel, self._leave,
-            self._L, len(x), ordered[0].size, ordered, self._room,
+            *factor, len(x), ordered[0].size, ordered, self._room,
             *map(blas, SOLVING),
         )  # fmt: skip
         x[:, self._order] = ordered

@@ -1,14 +1,18 @@
 """Solving for what is left of a net's tangent without the nodes between crossings.
 
 Each rank has the blocks that its own cells and connectors leave (``condensation``); the matrix is
-their sum over the ranks. Where it is definite, each rank eliminates by fronts what it alone adds to
-and the ranks together the few nodes of their edges, as a dense matrix (substructuring:
-Przemieniecki, AIAA J. 1 (1963) 138). Any other matrix is MUMPS'.
+their sum over the ranks. A symmetric one each rank eliminates by fronts as far as it alone adds to
+it, and the ranks together the few nodes of their edges, as a dense matrix (substructuring:
+Przemieniecki, AIAA J. 1 (1963) 138). Any other matrix is MUMPS', and those for which pivots have to
+be looked for.
 """
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +21,14 @@ from petsc4py import PETSc
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import (
+    LinAlgError,
+    LinAlgWarning,
+    cho_factor,
+    cho_solve,
+    lu_factor,
+    lu_solve,
+)
 
 from .. import _dolfinx
 from .blocks import BLOCK, block_matrix, expand
@@ -25,7 +36,7 @@ from .direct import destroy, give_back, ordering, solved, solver
 from .multifrontal import Fronts, blas_known
 from .ordering import nested_dissection
 
-__all__ = ["Definite", "General", "Left"]
+__all__ = ["ByFronts", "ByMumps", "Left"]
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -58,8 +69,8 @@ class Left:
     symmetric: bool
 
 
-class General:
-    """MUMPS, for LU on one rank in an order of our own.
+class ByMumps:
+    """MUMPS' factorisation, for LU on one rank in an order of our own.
 
     Args:
         left: what is left.
@@ -124,8 +135,8 @@ class General:
         destroy(self._solver, self._R, self._scale)
 
 
-class Definite:
-    """Cholesky's factorisation by fronts, of each rank's inside first and of the edges after.
+class ByFronts:
+    """Factorisation by fronts, of each rank's inside first and of the edges after.
 
     Args:
         left: what is left, of a symmetric matrix.
@@ -148,9 +159,10 @@ class Definite:
         self._edge = np.searchsorted(edge, here[at_edge])
         self._rows = expand(self._edge).astype(np.int64)
         self._dense = np.zeros((BLOCK * len(edge),) * 2)
+        self._edges: Callable[[Array], Array] | None = np.copy
 
     @classmethod
-    def of(cls, left: Left) -> Definite | None:
+    def of(cls, left: Left) -> ByFronts | None:
         """One where the matrix is symmetric, the edge short and C can be compiled. Collective."""
         if not left.symmetric or not blas_known():
             return None
@@ -162,21 +174,20 @@ class Definite:
         return None if functions is None else cls(left, functions)
 
     def factorise(self, blocks: Array) -> bool:
-        """Factorise the sum of all ranks' blocks; False where it is not definite. Collective."""
+        """Factorise the sum of all ranks' blocks; whether that served. Collective."""
         comm, dense = self._comm, self._dense
-        definite = self._fronts.factorise(blocks)
-        if not all(comm.allgather(definite)):
+        if not all(comm.allgather(self._fronts.factorise(blocks))):
+            # Or another factorisation would lie beside it.
+            self._fronts.release()
+            give_back()
             return False
         if len(dense):
             dense[:] = 0.0
             # The lower half by columns is the upper one by rows.
             dense[np.ix_(self._rows, self._rows)] = self._fronts.left.T
             comm.Allreduce(MPI.IN_PLACE, dense)
-            try:
-                self._factor = cho_factor(dense.T, lower=True, overwrite_a=True, check_finite=False)
-            except LinAlgError:
-                definite = False
-        return all(comm.allgather(definite))
+            self._edges = _solution(dense)
+        return all(comm.allgather(self._edges is not None))
 
     def solve(self, rights: Array) -> Array:
         """Solutions on the own nodes for right-hand sides there, (count, n_own, 6). Collective."""
@@ -188,14 +199,15 @@ class Definite:
             sums[:, self._edge] = x[:, self._at_edge]
             self._comm.Allreduce(MPI.IN_PLACE, sums)
             flat = sums.reshape(len(rights), -1)
-            flat[:] = cho_solve(self._factor, flat.T, check_finite=False).T
+            assert self._edges is not None
+            flat[:] = self._edges(flat.T).T
             x[:, self._at_edge] = sums[:, self._edge]
         self._fronts.recover(x)
         return x[:, self._own]
 
     def destroy(self) -> None:
         """Give back the factorisation."""
-        del self._fronts, self._dense
+        del self._fronts, self._dense, self._edges
         give_back()
 
 
@@ -205,3 +217,21 @@ def _edge(left: Left) -> Integers:
     adding[left.here] = 1
     left.comm.Allreduce(MPI.IN_PLACE, adding)
     return np.flatnonzero(adding > 1)
+
+
+def _solution(matrix: Array) -> Callable[[Array], Array] | None:
+    """Solves with a dense symmetric matrix, of which the upper half counts; None if singular."""
+    try:
+        factor = cho_factor(matrix.T, lower=True, check_finite=False)
+    except LinAlgError:
+        pass
+    else:
+        return partial(cho_solve, factor, check_finite=False)
+    upper = np.triu(matrix)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LinAlgWarning)
+        try:
+            factor = lu_factor(upper + np.triu(upper, 1).T, check_finite=False)
+        except LinAlgWarning:
+            return None
+    return partial(lu_solve, factor, check_finite=False)

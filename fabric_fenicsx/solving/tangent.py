@@ -25,7 +25,7 @@ from .blocks import BLOCK, expand
 from .condensation import Elimination, Runs, inner_nodes
 from .direct import destroy, ordering, petsc, solved, solver
 from .discretisation import Discretisation
-from .remainder import Definite, General, Left
+from .remainder import ByFronts, ByMumps, Left
 from .system import System
 
 __all__ = ["Condensed", "Whole", "tangent_of"]
@@ -142,7 +142,7 @@ class Condensed:
         net = self._net = system.net
         self._system, self._symmetric, self._prefix = system, symmetric, prefix
         self._functions = functions
-        self._fronts = PETSc.Options().getBool(prefix + "fronts", True)
+        self._may_front = PETSc.Options().getBool(prefix + "fronts", True)
         shape = (net.owned * BLOCK, len(net.net.points) * BLOCK)
         self.matrix = PETSc.Mat().createAIJ((shape, shape), nnz=0, comm=net.comm)
         self.matrix.assemble()
@@ -198,8 +198,8 @@ class Condensed:
             places=self._elimination.places,
             symmetric=self._symmetric,
         )
-        self._definite = Definite.of(self._left) if self._fronts else None
-        self._general: General | None = None
+        self._by_fronts = ByFronts.of(self._left) if self._may_front else None
+        self._by_mumps: ByMumps | None = None
 
     def _renumber(self) -> None:
         """The same with other chains."""
@@ -209,10 +209,10 @@ class Condensed:
 
     def _forget(self) -> None:
         """Give back the factorisations. Collective."""
-        for part in (self._definite, self._general):
+        for part in (self._by_fronts, self._by_mumps):
             if part is not None:
                 part.destroy()
-        self._definite = self._general = None
+        self._by_fronts = self._by_mumps = None
 
     def destroy(self) -> None:
         """Give back the matrices and the factorisation. Collective."""
@@ -247,14 +247,17 @@ class Condensed:
             self._since = 0
             self._renumber()
         blocks = self._elimination.left
-        self._solver: Definite | General
-        if self._definite is not None and self._definite.factorise(blocks):
-            self._solver = self._definite
+        self._solver: ByFronts | ByMumps
+        if self._by_fronts is not None and self._by_fronts.factorise(blocks):
+            if self._by_mumps is not None:
+                self._by_mumps.destroy()
+                self._by_mumps = None
+            self._solver = self._by_fronts
             return
-        if self._general is None:
-            self._general = General(self._left, self._prefix + "condensed_")
-        self._general.factorise(blocks)
-        self._solver = self._general
+        if self._by_mumps is None:
+            self._by_mumps = ByMumps(self._left, self._prefix + "condensed_")
+        self._by_mumps.factorise(blocks)
+        self._solver = self._by_mumps
 
     def solve(self, rights: Sequence[PETSc.Vec], solutions: Sequence[PETSc.Vec]) -> bool:
         """Solve by the last factorisation, together; whether it served. Collective."""
