@@ -131,20 +131,29 @@ class Fronts:
         self._sizes = self.entries, _highest(np.diff(row), children), largest
         self.release()
         of_block = np.flatnonzero(i == j)
-        self._diagonal = of_block[np.argsort(i[of_block])]
+        self._diagonal = pairs[of_block, 0], of_block
 
-    def factorise(self, blocks: Array) -> bool:
+    def diagonal(self, blocks: Array) -> Array:
+        """The diagonal of a matrix of the pattern, (n, 6)."""
+        found = np.zeros((len(self._order), BLOCK))
+        nodes, own = self._diagonal
+        found[nodes] = np.diagonal(blocks[own], axis1=1, axis2=2)
+        return found
+
+    def factorise(self, blocks: Array, diagonal: Array | None = None) -> bool:
         """Factorise, but for the edge; whether that can be done without looking for pivots.
 
         Args:
             blocks: those of the pattern, by rows, (n_blocks, 6, 6).
+            diagonal: of the whole matrix, where others add to it on the edge, (n, 6).
         """
         if not len(self._L):
             self._L, self._stack, self._room = (np.zeros(size) for size in self._sizes)
-        diagonal = np.abs(np.diagonal(blocks[self._diagonal], axis1=1, axis2=2))
+        whole = self.diagonal(blocks) if diagonal is None else diagonal
+        size = np.abs(whole[self._order])
         failed = self._call(
             "factorise", len(self._own) - 1, self._own, self._row, *self._fronts, self._leave,
-            blocks, np.ascontiguousarray(diagonal), GROWTH, self._below,
+            blocks, size, GROWTH, self._below,
             self._L, self._sign, self._stack, self._base, self._room, *map(blas, FACTORISING),
         )  # fmt: skip
         return failed >= 0

@@ -53,7 +53,7 @@ class Left:
         comm: of the ranks whose blocks are summed.
         points: where the nodes are, on every rank, (n, 3).
         pairs: nodes that are coupled, on every rank, (n_pairs, 2).
-        here: nodes that this rank adds to, in rising order.
+        here: nodes that this rank adds to or owns, in rising order.
         own: nodes whose unknowns are this rank's, in rising order.
         places: rows and columns of this rank's blocks; those of a symmetric matrix above the
             diagonal only.
@@ -176,7 +176,9 @@ class ByFronts:
     def factorise(self, blocks: Array) -> bool:
         """Factorise the sum of all ranks' blocks; whether that served. Collective."""
         comm, dense = self._comm, self._dense
-        if not all(comm.allgather(self._fronts.factorise(blocks))):
+        diagonal = self._fronts.diagonal(blocks)
+        self._sum_edges(diagonal[None])
+        if not all(comm.allgather(self._fronts.factorise(blocks, diagonal))):
             # Or another factorisation would lie beside it.
             self._fronts.release()
             give_back()
@@ -195,15 +197,29 @@ class ByFronts:
         x[:, self._own] = rights
         self._fronts.reduce(x)
         if len(self._dense):
-            sums = np.zeros((len(rights), len(self._dense) // BLOCK, BLOCK))
-            sums[:, self._edge] = x[:, self._at_edge]
-            self._comm.Allreduce(MPI.IN_PLACE, sums)
+            sums = self._sum_edges(x)
             flat = sums.reshape(len(rights), -1)
             assert self._edges is not None
             flat[:] = self._edges(flat.T).T
             x[:, self._at_edge] = sums[:, self._edge]
         self._fronts.recover(x)
         return x[:, self._own]
+
+    def _sum_edges(self, x: Array) -> Array:
+        """Sum what the ranks have on their edges, in place. Collective.
+
+        Args:
+            x: on this rank's nodes, (count, n_here, 6).
+
+        Returns:
+            The sums on all edges, (count, n_edge, 6).
+        """
+        sums = np.zeros((len(x), len(self._dense) // BLOCK, BLOCK))
+        if len(self._dense):
+            sums[:, self._edge] = x[:, self._at_edge]
+            self._comm.Allreduce(MPI.IN_PLACE, sums)
+            x[:, self._at_edge] = sums[:, self._edge]
+        return sums
 
     def destroy(self) -> None:
         """Give back the factorisation."""
@@ -212,7 +228,7 @@ class ByFronts:
 
 
 def _edge(left: Left) -> Integers:
-    """Nodes that several ranks add to, on every rank. Collective."""
+    """Nodes that several ranks add to, or others than their owner, on every rank. Collective."""
     adding = np.zeros(len(left.points), dtype=np.int32)
     adding[left.here] = 1
     left.comm.Allreduce(MPI.IN_PLACE, adding)

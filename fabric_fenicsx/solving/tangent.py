@@ -193,7 +193,7 @@ class Condensed:
             disc.comm,
             net.points[left],
             number[pairs],
-            here=np.sort(number[here][number[here] >= 0]),
+            here=np.unique(np.concatenate([*self._elimination.places, number[own]])),
             own=number[own],
             places=self._elimination.places,
             symmetric=self._symmetric,
