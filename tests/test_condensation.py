@@ -21,7 +21,7 @@ from fabric_fenicsx import _dolfinx
 from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.drape import DrapeCase
-from fabric_fenicsx.solving import tangent
+from fabric_fenicsx.solving import remainder, tangent
 from fabric_fenicsx.solving.blocks import BLOCK
 from fabric_fenicsx.solving.discretisation import Discretisation
 from fabric_fenicsx.solving.remainder import ByFronts, ByMumps
@@ -164,6 +164,15 @@ def test_symmetric_matrices_are_factorised_by_fronts(share):
     check(found, 1e-9)
     assert isinstance(condensed._solver, ByFronts)
     assert condensed._by_mumps is None
+
+
+@pytest.mark.mpi
+def test_long_edges_are_left_to_mumps(monkeypatch):
+    monkeypatch.setattr(remainder, "DENSE", 0)
+    system = Blocks(plain_net(3, 4, 4.0, 4), symmetric=True)
+    condensed, found = both(system)
+    check(found, 1e-11)
+    assert isinstance(condensed._solver, ByFronts if system.net.comm.size == 1 else ByMumps)
 
 
 @pytest.mark.mpi

@@ -27,9 +27,9 @@ Array = npt.NDArray[np.float64]
 
 #: Coefficients up to which, and nodes of a net from which on, Newton has the symmetric part of
 #: friction's tangent, which is factorised at less than half the cost. What is left out comes from
-#: the limit μ p, at most μ/2 times the contact's stiffness, and makes convergence linear: a drape of
-#: 2400 nodes took 1, 4 and 5 % more iterations at μ = 0.1, 0.2 and 0.35, at 0.6 19 %. Factorisations
-#: of smaller nets are not what takes their time.
+#: the limit μ p, at most μ/2 times the contact's stiffness, and makes convergence linear: a drape
+#: of 2400 nodes took 1, 4 and 5 % more iterations at μ = 0.1, 0.2 and 0.35, at 0.6 19 %. Smaller
+#: nets take most of their time otherwise.
 LOW_FRICTION, LARGE = 0.4, 1000
 
 

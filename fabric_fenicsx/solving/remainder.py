@@ -159,7 +159,7 @@ class ByFronts:
         self._edge = np.searchsorted(edge, here[at_edge])
         self._rows = expand(self._edge).astype(np.int64)
         self._dense = np.zeros((BLOCK * len(edge),) * 2)
-        self._edges: Callable[[Array], Array] | None = np.copy
+        self._edges: Callable[[Array], Array] | None = None
 
     @classmethod
     def of(cls, left: Left) -> ByFronts | None:
@@ -183,13 +183,15 @@ class ByFronts:
             self._fronts.release()
             give_back()
             return False
+        served = True
         if len(dense):
             dense[:] = 0.0
             # The lower half by columns is the upper one by rows.
             dense[np.ix_(self._rows, self._rows)] = self._fronts.left.T
             comm.Allreduce(MPI.IN_PLACE, dense)
             self._edges = _solution(dense)
-        return all(comm.allgather(self._edges is not None))
+            served = self._edges is not None
+        return all(comm.allgather(served))
 
     def solve(self, rights: Array) -> Array:
         """Solutions on the own nodes for right-hand sides there, (count, n_own, 6). Collective."""
