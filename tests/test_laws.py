@@ -375,7 +375,15 @@ def net_force(law):
 @every_law
 def test_the_net_and_the_single_crossing_have_the_same_force(law):
     """The moment m of a case: on the net's crossings times their area, in the loop as it is."""
-    (keys,) = CrossoverKeys.model_validate({"laws": [sample(law)]}).laws
+    compare_net_and_crossing(sample(law))
+
+
+def test_a_state_of_rest_that_moves_is_the_same_in_both():
+    compare_net_and_crossing(sample("shaped") | {"base": "rest", "constant": 0.02})
+
+
+def compare_net_and_crossing(values):
+    (keys,) = CrossoverKeys.model_validate({"laws": [values]}).laws
     path = gammas()
     D = LENGTH * (2.0 * np.cos(np.pi / 4 - path / 2) - np.sqrt(2.0))
     columns = {"time_s": np.arange(len(path), dtype=float), "displacement_mm": D}
@@ -383,7 +391,7 @@ def test_the_net_and_the_single_crossing_have_the_same_force(law):
     rig = PictureFrameRig(frame_length_mm=LENGTH, fabric_length_mm=N * SPACING)
     fabric = FabricKeys(areal_density_kg_m2=0.2)
     frame = PictureFrame([Measurement(Path(), "picture_frame", "", fabric, rig, 0.01, (run,))])
-    variant = FrameVariant(law, (), laws=lambda values: (keys.build(1.0),))
+    variant = FrameVariant("", (), laws=lambda values: (keys.build(1.0),))
     single, _ = frame.predict((variant,), {p.name: 0.0 for p in frame.baseline})
     whole = net_force(keys.build(SPACING**2))
     # At the start and where the motion turns there are two rates.

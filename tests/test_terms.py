@@ -10,6 +10,9 @@ from ufl import as_ufl
 
 from fabric_fenicsx.inputs.python_file import classes_of, run_file
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
+from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.noise import Noise
+from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.picture_frame import PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.terms import terms
@@ -17,6 +20,7 @@ from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.loop.report.discovered import _shortest
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw
 from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw, shape_of
+from fabric_fenicsx.rigs.cases import CrossoverKeys
 
 STEP = 0.5
 RANGES = {
@@ -132,6 +136,44 @@ def test_bases():
         assert marched(law, PATH)[0] == pytest.approx(moments), base
 
 
+def test_a_state_of_rest_follows_the_largest_angle():
+    """By f = 0.5 |γ|_max to the side it was on: M = e(γ − s f) − e(γ) with e = 2 γ + 5 γ³."""
+    law = ShapedLaw("rest", "largest_angle", reach=1.0, coefficients=(0.5,), k1=2.0, k3=5.0)
+    gamma = np.array([0.1, 0.3, 0.0, -0.2, -0.4, 0.2])
+    largest, side = [0.1, 0.3, 0.3, 0.3, 0.4, 0.4], [1.0, 1.0, 1.0, 1.0, -1.0, -1.0]
+
+    def spring(angle):
+        return 2.0 * angle + 5.0 * angle**3
+
+    shifted = spring(gamma - 0.5 * np.multiply(largest, side)) - spring(gamma)
+    assert marched(law, gamma)[0] == pytest.approx(shifted)
+
+
+def test_a_state_of_rest_is_an_angle_in_a_net():
+    """Shares and angles stay what they are, moments per area are times the area."""
+    numbers = {"law": "shaped", "variable": "path", "reach": 1.0, "coefficients": [0.5]}
+    numbers |= {"shape": "spline", "k1_N_mm": 2.0}
+    bases = [numbers | {"base": base} for base in ("rest", "odd")]
+    rest, odd = (keys.build(25.0) for keys in CrossoverKeys.model_validate({"laws": bases}).laws)
+    assert tuple(rest.coefficients) == (0.5,) and rest.k1 == 50.0
+    assert tuple(odd.coefficients) == (12.5,)
+
+
+def test_pieces_of_a_spline_lie_where_readings_are():
+    """On both sides of 0, C¹, and each coefficient acts beyond its knot alone."""
+    ends, h = (-1.0, 0.5), 1e-6
+
+    def f(x, *c):
+        return float(as_ufl(shape_of("spline", c, as_ufl(x), ends=ends)))
+
+    # Four pieces: knots at -0.625, -0.25 and 0.125.
+    for k, (knot, outside) in enumerate([(-0.625, -1.0), (-0.25, -1.0), (0.125, 0.5)]):
+        only = np.eye(5)[2 + k]
+        assert f(knot, *only) == f(0.0, *only) == 0.0
+        assert f(outside, *only) == pytest.approx((outside - knot) ** 2)
+        assert abs(f(knot + h, *only) - f(knot - h, *only)) < 1e-9
+
+
 def test_terms_cover_the_contract():
     """What acts, and what it depends on, as the table of a report's `discovered` allows."""
     allowed = {
@@ -181,8 +223,12 @@ def travels(*corners):
     return gamma, FRAME * (2 * np.cos(theta) - math.sqrt(2.0))
 
 
-def write(folder, wear):
-    """Two fitted runs and one held out; of the elastic moment, wear (1 − e^(−path/0.6)) is lost."""
+def write(folder, wear, permanent=0.0, guide=0.0):
+    """Two fitted runs and one held out.
+
+    Of the elastic moment, wear (1 − e^(−path/0.6)) is lost, its state of rest is at
+    ``permanent`` max(γ_max − 0.2, 0), and a guide rubs with ``guide`` [N] at 25 ± 8 mm.
+    """
     folder.mkdir(parents=True)
     rng = np.random.default_rng(5)
     runs = {
@@ -196,8 +242,11 @@ def write(folder, wear):
         time = np.arange(len(gamma), dtype=float)
         rate = np.gradient(gamma)
         path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(gamma)))])
-        m = (K1 * gamma + K3 * gamma**3) * (1.0 - wear * (1.0 - np.exp(-path / 0.6))) + C1 * rate
+        rest = permanent * np.maximum(np.maximum.accumulate(gamma) - 0.2, 0.0)
+        elastic = K1 * (gamma - rest) + K3 * (gamma - rest) ** 3
+        m = elastic * (1.0 - wear * (1.0 - np.exp(-path / 0.6))) + C1 * rate
         force = m * FABRIC**2 / (FRAME * np.sin(np.pi / 4 - gamma / 2))
+        force = force + guide * np.sign(np.gradient(D)) * np.exp(-(((D - 25.0) / 8.0) ** 2))
         force = force + NOISE * rng.standard_normal(len(force))
         table = np.column_stack([time, D, force])
         head = "time_s,displacement_mm,force_N"
@@ -285,6 +334,41 @@ def test_the_file_is_the_term(worn, tmp_path):
             memory[k].update(new)
         assert values[0] == pytest.approx(area * values[1], rel=1e-9, abs=1e-12)
         before = gamma
+
+
+@pytest.mark.parametrize(
+    ("put_in", "term", "truth"),
+    [
+        (
+            {"permanent": 0.5},
+            "rest_moment_of_largest_angle",
+            lambda x: 0.5 * np.maximum(x - 0.2, 0.0),
+        ),
+        (
+            {"guide": 2.0},
+            "reading_of_displacement_and_direction",
+            lambda x: 2.0 * np.exp(-(((x - 25.0) / 8.0) ** 2)),
+        ),
+    ],
+)
+def test_the_right_term_leaves_noise(tmp_path, put_in, term, truth):
+    """In runs held out too, and its shape is the one put in; without it much is left."""
+    experiment = PictureFrame([read_measurement(write(tmp_path / "set", 0.0, **put_in))])
+    (effect,) = (t for t in experiment.terms if t.name == term)
+    variant = next(v for v in reversed(effect.variants) if "coefficients" in v.label)
+    rows, holdout = experiment.readings.fit, experiment.readings.holdout
+    white = Variances(Noise(NOISE))
+    base = {"k1_N": K1, "k3_N": K3, "c1_N_s": C1}
+    without = fit(experiment, (), base, rows, white)
+    found = fit(
+        experiment, (variant,), base | {p.name: 1e-3 for p in variant.parameters}, rows, white
+    )
+    assert without.rms(rows) > 3.0 * NOISE
+    assert found.rms(rows) < 1.5 * NOISE and found.rms(holdout) < 1.5 * NOISE
+    shape = variant.shape
+    x = np.linspace(0.02, 0.98, 25)
+    value = [float(as_ufl(shape.value(found.values, as_ufl(float(one))))) for one in x]
+    assert np.abs(value - truth(shape.reach * x)).max() < 0.1 * truth(shape.reach * x).max()
 
 
 def test_two_terms_of_the_travel_add(tmp_path):

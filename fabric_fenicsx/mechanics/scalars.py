@@ -17,13 +17,24 @@ from ufl.algorithms.apply_derivatives import apply_derivatives
 from ufl.classes import Label, ScalarValue, Variable, Zero
 from ufl.corealg.traversal import unique_post_traversal
 
-__all__ = ["Steps", "derivative_of", "numpy_function", "steps_of", "symbol"]
+__all__ = ["Steps", "derivative_of", "evaluated", "lowered", "numpy_function", "steps_of", "symbol"]
+
+
+def _power(x: Any, n: Any) -> Any:
+    """X to the n; of arrays numpy multiplies only where it is told to."""
+    if isinstance(n, float):
+        if n == 2.0:
+            return x * x
+        if n == 3.0:
+            return x * x * x
+    return np.power(x, n)
+
 
 OPERATORS: dict[str, Callable[..., Any]] = {
     "Sum": np.add,
     "Product": np.multiply,
     "Division": np.divide,
-    "Power": np.power,
+    "Power": _power,
     "Abs": np.abs,
     "Real": np.real,
     "Sign": np.sign,
@@ -63,7 +74,12 @@ def symbol() -> Any:
 
 def derivative_of(expression: Any, by: Any) -> Any:
     """d(expression)/d(symbol), carried out."""
-    return apply_derivatives(apply_algebra_lowering(diff(as_ufl(expression), by)))
+    return apply_derivatives(diff(as_ufl(expression), by))
+
+
+def lowered(expression: Any) -> Any:
+    """An expression in UFL's elementary operators, its derivatives carried out."""
+    return apply_derivatives(apply_algebra_lowering(as_ufl(expression)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +100,7 @@ def steps_of(expressions: Sequence[Any], symbols: Mapping[str, Any]) -> Steps:
     """Take expressions of scalars apart.
 
     Args:
-        expressions: in the symbols, numbers and operators of UFL.
+        expressions: in the symbols, numbers and operators of UFL, lowered.
         symbols: by the name under which their values are passed.
 
     Raises:
@@ -95,8 +111,7 @@ def steps_of(expressions: Sequence[Any], symbols: Mapping[str, Any]) -> Steps:
     operations: list[tuple[str, Any]] = []
     results = []
     for expression in expressions:
-        lowered = apply_derivatives(apply_algebra_lowering(as_ufl(expression)))
-        for node in unique_post_traversal(lowered):
+        for node in unique_post_traversal(expression):
             if node in place or isinstance(node, Label):
                 continue
             place[node] = len(operations)
@@ -113,20 +128,24 @@ def steps_of(expressions: Sequence[Any], symbols: Mapping[str, Any]) -> Steps:
                 operations.append((kind, [place[operand] for operand in node.ufl_operands]))
             else:
                 raise ValueError(f"{kind} in an expression of scalars")
-        results.append(place[lowered])
+        results.append(place[expression])
     return Steps(operations, results)
 
 
 def numpy_function(
     expressions: Sequence[Any], symbols: Mapping[str, Any]
 ) -> Callable[[Mapping[str, Any]], list[Any]]:
-    """A function that evaluates scalar expressions; see steps_of.
+    """A function that evaluates scalar expressions in the symbols; see evaluated."""
+    return evaluated(steps_of([lowered(one) for one in expressions], symbols))
+
+
+def evaluated(steps: Steps) -> Callable[[Mapping[str, Any]], list[Any]]:
+    """A function that does single operations.
 
     Returns:
         Takes values by name, numbers or arrays that broadcast, and gives one value for each
         expression, a number where it depends on none of the arrays.
     """
-    steps = steps_of(expressions, symbols)
 
     def evaluate(at: Mapping[str, Any]) -> list[Any]:
         values: list[Any] = []

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...mechanics.scalars import derivative_of, numpy_function, steps_of, symbol
+from ...mechanics.scalars import derivative_of, evaluated, lowered, steps_of, symbol
 from .compiled import march
 
 __all__ = ["Marched", "Varying"]
@@ -148,9 +148,9 @@ class _Differentiated:
     def __init__(
         self, expressions: list[Any], symbols: dict[str, Any], by: Mapping[str, Any]
     ) -> None:
-        flat = list(expressions)
+        flat = [lowered(expression) for expression in expressions]
         self.partials: list[dict[str, int]] = []
-        for expression in expressions:
+        for expression in flat[: len(expressions)]:
             own = {}
             for name, one in by.items():
                 derivative = derivative_of(expression, one)
@@ -159,7 +159,7 @@ class _Differentiated:
                     flat.append(derivative)
             self.partials.append(own)
         self.steps = steps_of(flat, symbols)
-        self._evaluate = numpy_function(flat, symbols)
+        self._evaluate = evaluated(self.steps)
 
     def __call__(self, at: Mapping[str, Any]) -> list[tuple[Any, dict[str, Any]]]:
         values = self._evaluate(at)

@@ -28,6 +28,7 @@ class Shape:
         reach: the variable's largest value in the fitted readings.
         value: from the parameters and the variable's share of its reach, in UFL.
         fixed: numbers of the term that are not fitted, by name.
+        ends: its values in the fitted readings lie between these shares of the reach.
     """
 
     x: str
@@ -35,6 +36,7 @@ class Shape:
     reach: float
     value: Callable[[Values, Any], Any]
     fixed: Mapping[str, Any] = field(default_factory=dict)
+    ends: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -45,6 +45,9 @@ BASELINE = (
     Parameter("c1_N_s", (0.0,), 0.0, meaning="dashpot, moment per area and rate"),
 )
 
+#: Share of the largest size below which a reading on the other side of 0 is none.
+LITTLE = 0.05
+
 
 class CrossheadTest:
     """Tests of one fabric, driven by a crosshead whose force is read.
@@ -242,6 +245,22 @@ class CrossheadTest:
             "force": force,
             "force_rate": force / max(float(np.median(time[-1])), 1e-9),
         }
+
+    def _ends(self) -> dict[str, tuple[float, float]]:
+        """Between which shares of their largest sizes signed variables of terms are."""
+        rows = self.readings.fit & self.readings.first
+        signed = {
+            "displacement": self._at_readings(self._points["D"].value)[rows],
+            "speed": self._at_readings(self._points["D_rate"].value)[rows],
+            "force": self.readings.observed[rows],
+        }
+
+        def ends(values: Array) -> tuple[float, float]:
+            shares = values / np.abs(values).max()
+            low, high = float(shares.min()), float(shares.max())
+            return (low if low < -LITTLE else 0.0), (high if high > LITTLE else 0.0)
+
+        return {name: ends(values) for name, values in signed.items()}
 
     def predict(
         self,

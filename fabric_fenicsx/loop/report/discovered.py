@@ -84,7 +84,7 @@ def _shape_table(d: Diagnosis, variant: Variant) -> pd.DataFrame:
     value = shape.value(symbols, symbols["x"])
     by = [p.name for p in variant.parameters]
     evaluate = numpy_function([value, *(derivative_of(value, symbols[n]) for n in by)], symbols)
-    x = np.linspace(0.0, 1.0, POINTS)
+    x = np.linspace(*shape.ends, POINTS)
     values, *slopes = evaluate({n: d.final.values[n] for n in by} | {"x": x})
     full = {n: np.broadcast_to(s, x.shape) for n, s in zip(by, slopes, strict=True)}
     std = d.final.error_of(full)
@@ -163,7 +163,7 @@ def _bump(place: str, width: str, at_zero: float) -> str:
 def _shortest(table: pd.DataFrame) -> str:
     """The formula of fewest numbers that is near a shape; that it has none where there is none."""
     name, own, std = (table[c].to_numpy() for c in table.columns)
-    reach = float(name[-1])
+    reach = float(np.abs(name).max())
     unit = parameter_unit(str(table.columns[0]))
     v = str(table.columns[0])
     if unit:
@@ -172,7 +172,7 @@ def _shortest(table: pd.DataFrame) -> str:
     x = name / reach
     size = float(np.ptp(own)) or 1.0
     allowed = np.maximum(SIGMAS * std, SHARE * size)
-    start = float(own[0])
+    start = float(own[np.argmin(np.abs(name))])
     # As far as it goes from there, either way.
     far = float(own[np.argmax(np.abs(own - start))]) - start or size
     best: tuple[int, float, str] | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ... import __version__
+from ...mechanics.laws.shaped import OF_ELASTIC
 from ..inference.effects import valued
 from .discovered import Discovered
 
@@ -69,7 +70,7 @@ SHAPE = {{
 def added(p, at):
     """What is added: {y}."""
     x = max_value(min_value(at["{variable}"] / REACH, 1), -1)
-    return p["{name}_amount"] * ff.shape_of(x=x, **SHAPE)
+    return p["{name}_amount"] * {value}
 
 
 EFFECTS = [
@@ -77,12 +78,17 @@ EFFECTS = [
         "{name}",
         "{test}",
         "{about}",
-        (ff.FrameVariant("as found", (AMOUNT,), of=("{variable}",), added_{acts_on}=added),),
+        (ff.FrameVariant("as found", (AMOUNT,), of={of!r}, added_{acts_on}=added),),
         of_fabric=False,
     )
 ]
 '''
 
+VALUE = "ff.shape_of(x=x, **SHAPE)"
+AGAINST_THE_MOTION = """(
+        ({constant!r} + ff.shape_of(x=x, **SHAPE))
+        * ff.shape_of("sign", (1.0,), at["speed"], width={slow!r})
+    )"""
 
 OF_A_STRIP = """
 import fabric_fenicsx as ff
@@ -127,10 +133,15 @@ def effect_file(term: Discovered, titles: str) -> str:
         return (HEAD + OF_A_STRIP).format(values=values, ranges=ranges, **form, **words)
     numbers = {name: valued(n, term.values) for name, n in shape.fixed.items()}
     if "base" in numbers:
-        if numbers["base"] == "elastic":
+        if numbers["base"] in OF_ELASTIC:
             numbers |= {"k1": term.values["k1_N"], "k3": term.values["k3_N"]}
         lines = "\n".join(f"    {name}={value!r}," for name, value in numbers.items())
         return (HEAD + LAW).format(numbers=lines, **words)
     numbers["kind"], variable = numbers.pop("shape"), numbers.pop("variable")
+    value, of = VALUE, [variable]
+    if "slow" in numbers:
+        motion = {name: numbers.pop(name) for name in ("constant", "slow")}
+        value, of = AGAINST_THE_MOTION.format(**motion), [variable, "speed"]
     lines = "\n".join(f"    {name!r}: {value!r}," for name, value in numbers.items())
-    return (HEAD + OF_THE_RIG).format(numbers=lines, variable=variable, **words)
+    rig = {"variable": variable, "value": value, "of": tuple(of)}
+    return (HEAD + OF_THE_RIG).format(numbers=lines, **rig, **words)

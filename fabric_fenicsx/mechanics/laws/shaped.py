@@ -27,7 +27,15 @@ Variable = Literal[
 ]
 Kind = Literal["spline", "graded", "step", "saturation", "logarithm"]
 Base = Literal[
-    "elastic", "viscous", "dissipative", "smooth", "odd", "even", "odd_in_rate", "even_in_rate"
+    "elastic",
+    "rest",
+    "viscous",
+    "dissipative",
+    "smooth",
+    "odd",
+    "even",
+    "odd_in_rate",
+    "even_in_rate",
 ]
 
 
@@ -70,24 +78,35 @@ FRICTION = ("dissipative", "smooth")
 GRADED = (0.05, 0.1, 0.2, 0.4)
 """Knots of a graded spline between its ends."""
 
+OF_ELASTIC = ("elastic", "rest")
+"""Bases made of the spring's moment, whose numbers are no moments per area."""
+
 AT_HAND = ("angle", "rate")
-"""Those that do not."""
+"""Variables that do not remember."""
 
 
-def shape_of(kind: str, coefficients: Any, x: Any, place: Any = 0.5, width: Any = 0.1) -> Any:
+def shape_of(
+    kind: str,
+    coefficients: Any,
+    x: Any,
+    place: Any = 0.5,
+    width: Any = 0.1,
+    ends: tuple[float, float] = (0.0, 1.0),
+) -> Any:
     """A function of x, from 0 to 1 or on both sides of 0, that is 0 at 0.
 
     Args:
         kind: "spline", a C¹ quadratic one with as many equal pieces less one as coefficients,
-            Σ c_k x^k for the first two, then c_k (x − t_k)₊²; "graded", one with the knots GRADED,
-            for what bends at the beginning; "step", c / (1 + exp(−(x − x₀)/w));
-            "saturation", c (1 − exp(−x/w)); "logarithm", c ln(1 + x/w); "periodic",
-            c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1);
+            Σ c_k x^k for the first two, then c_k (x − t_k)₊², of a knot below 0 c_k (t_k − x)₊²;
+            "graded", one with the knots GRADED, for what bends at the beginning; "step",
+            c / (1 + exp(−(x − x₀)/w)); "saturation", c (1 − exp(−x/w)); "logarithm",
+            c ln(1 + x/w); "periodic", c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1);
             "sign", c tanh(x/w).
         coefficients: c or c_k.
         x: where.
         place: x₀ of a step.
         width: w.
+        ends: between which the pieces of a spline lie.
     """
     c = coefficients
     if kind == "step":
@@ -103,11 +122,11 @@ def shape_of(kind: str, coefficients: Any, x: Any, place: Any = 0.5, width: Any 
     if kind == "sign":
         return c[0] * tanh(x / width)
     pieces = max(len(c) - 1, 1)
-    knots = GRADED if kind == "graded" else [k / pieces for k in range(1, pieces)]
-    value = c[0] * x
-    for k, knot in enumerate((0.0, *knots)[: len(c) - 1], 1):
-        from_knot = x if knot == 0.0 else max_value(x - knot, 0)
-        value = value + c[k] * from_knot**2
+    low, high = ends
+    even = [low + (high - low) * k / pieces for k in range(1, pieces)]
+    value = c[0] * x + (c[1] * x**2 if len(c) > 1 else 0)
+    for c_k, knot in zip(c[2:], GRADED if kind == "graded" else even, strict=True):
+        value = value + c_k * max_value(knot - x if knot < 0.0 else x - knot, 0) ** 2
     return value
 
 
@@ -121,14 +140,17 @@ class ShapedLaw(CrossingLaw):
     Attributes:
         base: of what it is a factor: "elastic" k₁ γ + k₃ γ³, "viscous" γ̇, "dissipative" a friction
             of limit 1 with a stick, "smooth" Dahl's of limit 1, "odd" sign γ, "even" 1,
-            "odd_in_rate" sign γ̇, "even_in_rate" 1.
+            "odd_in_rate" sign γ̇, "even_in_rate" 1. Of "rest" it is no factor but an angle, to
+            which the spring has moved its state of rest: with e the elastic moment and s the sign
+            of γ where it was largest so far, M = e(γ − s (c₀ + f)) − e(γ), as of a permanent set.
         variable: v, see VARIABLES.
         reach: v_max [rad, rad/s or s].
-        coefficients: of f: [-] of the elastic base, [N mm s] of the viscous one, else [N mm].
+        coefficients: of f: [-] of the elastic base, [rad] of an angle of rest, [N mm s] of the
+            viscous base, else [N mm].
         constant: c₀, as they are.
         shape: one of those of ``shape_of`` that Kind names.
         place, width: its x₀ and w, as shares of v_max.
-        k1, k3: of the elastic base [N mm].
+        k1, k3: of the elastic moment [N mm].
         stick_angle: of a friction [rad].
         memory: τ of a variable that forgets [s].
     """
@@ -150,9 +172,9 @@ class ShapedLaw(CrossingLaw):
 
     @classmethod
     def of_case(cls, values: Mapping[str, Any], area: float) -> Self:
-        """As of any law; coefficients that are no shares of an elastic moment are per area too."""
+        """As of any law; coefficients that are moments are per area too."""
         law = super().of_case(values, area)
-        if law.base == "elastic":
+        if law.base in OF_ELASTIC:
             return law
         scaled = tuple(c * area for c in law.coefficients)
         return replace(law, coefficients=scaled, constant=law.constant * area)
@@ -171,19 +193,36 @@ class ShapedLaw(CrossingLaw):
         return at.number(self.constant) + shape_of(self.shape, parts, x, place, width)
 
     def moment(self, at: Crossing) -> Any:
-        """The base times the factor."""
+        """The base times the factor, or what a shifted state of rest changes."""
+        if self.base == "rest":
+            shifted = at.gamma - self._side(at) * self.factor(at)
+            return self._elastic(at, shifted) - self._elastic(at, at.gamma)
         return self._base_at(at) * self.factor(at)
 
     def history(self, at: Crossing) -> dict[str, Any]:
-        """The variable, if it remembers, and the moment of the friction over its limit."""
+        """The variable, if it remembers, and what the base remembers of its own.
+
+        Of a friction its moment over its limit, of a state of rest the largest angle so far and
+        its sign.
+        """
         history = {} if self.variable in AT_HAND else {"variable": self.variable_at(at)}
+        if self.base == "rest":
+            history |= {"largest": max_value(at.past("largest"), at.size), "side": self._side(at)}
         if self.base in FRICTION:
             history["stick"] = self._base_at(at)
         return history
 
+    def _side(self, at: Crossing) -> Any:
+        """The sign of γ where it was largest so far."""
+        further = gt(at.size, at.past("largest"))
+        return conditional(further, signed(at.gamma, 1.0), at.past("side"))
+
+    def _elastic(self, at: Crossing, gamma: Any) -> Any:
+        return at.number(self.k1) * gamma + at.number(self.k3) * gamma**3
+
     def _base_at(self, at: Crossing) -> Any:
         if self.base == "elastic":
-            return at.number(self.k1) * at.gamma + at.number(self.k3) * at.gamma**3
+            return self._elastic(at, at.gamma)
         if self.base == "viscous":
             return at.rate
         if self.base == "dissipative":

@@ -6,7 +6,7 @@ from typing import Any
 
 from ufl import as_ufl, as_vector, variable
 
-from ..scalars import steps_of
+from ..scalars import lowered, steps_of
 from .law import Crossing, CrossingLaw
 
 __all__ = ["try_out"]
@@ -51,7 +51,7 @@ def _numbers(law: CrossingLaw, value: float) -> list[float]:
     )
     moment = law.moment(at)
     said = [moment, *law.energy_and_loss(at, as_ufl(moment)), *law.history(at).values()]
-    steps = steps_of([expression for expression in said if expression is not None], symbols)
+    steps = steps_of([lowered(one) for one in said if one is not None], symbols)
     taken = {k for _, own in steps.operations if isinstance(own, list) for k in own}
     taken |= set(steps.results)
     numbers = [(k, own) for k, (what, own) in enumerate(steps.operations) if what == "number"]

@@ -95,7 +95,7 @@ class BiasExtension(CrossheadTest):
         forces = self.readings.fit & self.readings.first
         if not forces.any():
             return []
-        return strip_terms(self._ranges(), goes_back=bool(self._back.any()))
+        return strip_terms(self._ranges(), self._ends(), goes_back=bool(self._back.any()))
 
     @cached_property
     def alike(self) -> frozenset[str]:  # type: ignore[override]

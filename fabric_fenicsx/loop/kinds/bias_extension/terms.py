@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 from ...inference.effects import Effect
-from ..picture_frame.terms import terms
+from ..picture_frame.terms import Ends, terms
 
 __all__ = ["strip_terms"]
 
@@ -30,15 +31,20 @@ GENERAL_FORMS = {
 OF_ONE_WAY = {
     "elastic_moment_of_largest_angle": "shear_locking",
     "elastic_moment_of_path": "shear_locking",
+    "rest_moment_of_largest_angle": "shear_locking",
+    "rest_moment_of_path": "shear_locking",
 }
 """... and those of strips that never go back, along which the path is the angle."""
 
 
-def strip_terms(ranges: Mapping[str, float], *, goes_back: bool = True) -> list[Effect]:
+def strip_terms(
+    ranges: Mapping[str, float], ends: Ends = MappingProxyType({}), *, goes_back: bool = True
+) -> list[Effect]:
     """The terms of a strip.
 
     Args:
         ranges: see picture_frame.terms.
+        ends: likewise.
         goes_back: whether some strip does.
     """
     general = GENERAL_FORMS if goes_back else GENERAL_FORMS | OF_ONE_WAY
@@ -50,6 +56,6 @@ def strip_terms(ranges: Mapping[str, float], *, goes_back: bool = True) -> list[
                 effect for name, effect in general.items() if term.name.startswith(name)
             ),
         )
-        for term in terms(ranges)
+        for term in terms(ranges, ends)
         if not term.name.startswith("even")
     ]

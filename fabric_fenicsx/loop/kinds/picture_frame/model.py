@@ -73,7 +73,7 @@ class PictureFrame(CrossheadTest):
     @cached_property
     def terms(self) -> list[Effect]:
         """Terms without a formula over what the fitted readings reached, if more than curves."""
-        return [] if self.curves_only else terms(self._ranges())
+        return [] if self.curves_only else terms(self._ranges(), self._ends())
 
     @property
     def one_curve(self) -> OneCurve | None:

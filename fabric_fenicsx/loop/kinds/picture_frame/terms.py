@@ -8,20 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shaped import GRADED, ShapedLaw, shape_of
+from ....mechanics.laws.shaped import GRADED, OF_ELASTIC, ShapedLaw, shape_of
 from ...inference.effects import Effect, Shape, Values, valued
 from .variant import FrameVariant
 
 __all__ = ["terms"]
 
-#: Numbers of coefficients of a spline.
-SPLINES = (1, 2, 3, 5)
+#: Numbers of coefficients of a spline; the last one of what a place may have to itself.
+SPLINES = (1, 2, 3, 5, 9)
+#: What has that one.
+FINE = (("odd", "angle"), ("even", "angle"), ("reading", "displacement"))
 #: Where a step may begin to be looked for, as a share of the range, and how wide it is.
 PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
 #: Decays, as shares of the range.
@@ -42,23 +45,29 @@ FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate")
 """Variables of a fading memory."""
 
 
-def terms(ranges: Mapping[str, float]) -> list[Effect]:
+Ends = Mapping[str, tuple[float, float]]
+"""Between which shares of their largest sizes variables were, by their names."""
+
+
+def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> list[Effect]:
     """The terms of a picture frame.
 
     Args:
-        ranges: largest value in the fitted readings of "angle", "rate", "path" [rad], "time" [s],
+        ranges: largest size in the fitted readings of "angle", "rate", "path" [rad], "time" [s],
             "displacement" [mm], "speed" [mm/s], "acceleration" [mm/s²], "force" [N] and of its
             change, "force_rate" [N/s].
+        ends: of those that may be negative.
     """
     largest = dict(ranges)
     largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
     largest |= {name: ranges["angle"] for name in ("recent_angle", "recent_largest_angle")}
-    return [*_of_the_crossing(largest), *_of_the_rig(largest)]
+    return [*_of_the_crossing(largest), *_of_the_rig(largest, ends)]
 
 
 def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
     bases: dict[str, tuple[str, ...]] = {
         "elastic": ("largest_angle", "path", "time", "rate", "unloading", *FORGETFUL),
+        "rest": ("largest_angle", "path", "time"),
         "viscous": ("angle", "largest_angle", "path", "time", "unloading", *FORGETFUL),
         "dissipative": ("angle", "largest_angle", "path", "time", "unloading", *FORGETFUL),
         "odd": ("angle",),
@@ -75,11 +84,11 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             name = f"{base}_moment_of_{reported}"
             alike = ("dissipative", "smooth") if base == "dissipative" else (base,)
             forms = [f for b in alike for v in own for f in _laws(name, b, v, largest)]
-            depends_on = (reported, *also.get(base, ()))
+            depends_on, words = (reported, *also.get(base, ())), base.replace("_", " ")
             yield Effect(
                 name,
                 "picture_frame",
-                f"{base.replace('_', ' ')} moment, by {reported.replace('_', ' ')}",
+                f"{ABOUT.get(base, f'{words} moment')}, by {reported.replace('_', ' ')}",
                 tuple(forms),
                 # A weave's law is odd.
                 of_fabric=not base.startswith("even"),
@@ -108,11 +117,16 @@ X = {
 
 Y = {
     "elastic": "share_of_elastic_moment",
+    "rest": "rest_angle_rad",
     "viscous": "moment_per_rate_N_s",
     "reading": "reading_N",
     "travel": "travel_mm",
 }
 """What a term is a factor of, or adds, with units."""
+
+
+ABOUT = {"rest": "state of rest of the elastic moment"}
+"""What a base is called where it is no moment."""
 
 
 def _reported(variable: str) -> str:
@@ -134,8 +148,8 @@ def _laws(
     if base in ("dissipative", "smooth"):
         fixed["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-4, 0.3)
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
-    of_baseline = ("k1_N", "k3_N") if base == "elastic" else ()
-    for label, coefficients, numbers in _shapes(name, _wealth(variable)):
+    of_baseline = ("k1_N", "k3_N") if base in OF_ELASTIC else ()
+    for label, coefficients, numbers in _shapes(name, _wealth(base, variable)):
         own = fixed | numbers
         parameters = [*coefficients, *(n for n in own.values() if isinstance(n, Parameter))]
         own["coefficients"] = coefficients
@@ -154,22 +168,24 @@ def _factor(numbers: Mapping[str, Any], values: Values, x: Any) -> Any:
     """A law's factor at a share x of the reach."""
     own = {key: valued(n, values) for key, n in numbers.items()}
     shape = own.pop("shape"), own.pop("coefficients")
-    at = {key: own[key] for key in ("place", "width") if key in own}
+    at = {key: own[key] for key in ("place", "width", "ends") if key in own}
     return own.get("constant", 0.0) + shape_of(*shape, x, **at)
 
 
 def _law(numbers: Mapping[str, Any], values: Values) -> tuple[ShapedLaw, ...]:
     own = {key: valued(n, values) for key, n in numbers.items()}
-    if own["base"] == "elastic":
+    if own["base"] in OF_ELASTIC:
         own |= {"k1": values["k1_N"], "k3": values["k3_N"]}
     return (ShapedLaw(**own),)
 
 
-def _wealth(variable: str) -> int:
+def _wealth(base: str, variable: str) -> int:
     """How many of the splines, which are the more the less else there is to be found."""
     if variable == "unloading":
         return 1
-    return 3 if variable in FORGETFUL else len(SPLINES)
+    if (base, variable) in FINE:
+        return 5
+    return 3 if variable in FORGETFUL else 4
 
 
 def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
@@ -177,7 +193,7 @@ def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...]
 
     Args:
         name: of the term, with which its parameters begin.
-        wealth: how many of the splines; one alone is the line, all have every other shape too.
+        wealth: how many of the splines; one alone is the line, four have every other shape too.
     """
     for count in SPLINES[:wealth]:
         own = tuple(Parameter(f"{name}_{k + 1}", amplitude=True) for k in range(count))
@@ -189,7 +205,7 @@ def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...]
         yield "step", one, {"shape": "step", "place": place, "width": width}
         decay = Parameter(f"{name}_decay", DECAYS, 0.01, 2.0)
         yield "saturation", one, {"shape": "saturation", "width": decay}
-    if wealth == len(SPLINES):
+    if wealth >= 4:
         own = tuple(Parameter(f"{name}_{k + 1}", amplitude=True) for k in range(len(GRADED) + 2))
         yield "graded", own, {"shape": "graded"}
         bend = Parameter(f"{name}_bend", BENDS, 1e-3, 1.0)
@@ -199,21 +215,31 @@ def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...]
 # Rig ------------------------------------------------------------------------------------------
 
 
-def _of_the_rig(largest: Mapping[str, float]) -> Iterator[Effect]:
+def _of_the_rig(largest: Mapping[str, float], ends: Ends) -> Iterator[Effect]:
     for acts_on, variables in RIG.items():
         for variable, reported in variables.items():
             name = f"{acts_on}_of_{variable}"
-            forms = _of_rig(acts_on, name, variable, largest[variable])
-            about = f"what acts on the {acts_on}, by {' and '.join(reported)}"
-            yield Effect(
-                name,
-                "picture_frame",
-                about,
-                tuple(forms),
-                of_fabric=False,
-                acts_on=acts_on,
-                depends_on=reported,
-            )
+            forms = _of_rig(acts_on, name, variable, largest, ends)
+            yield _rig_term(acts_on, name, reported, forms)
+    for variable in AGAINST_THE_MOTION:
+        name = f"reading_of_{variable}_and_direction"
+        forms = _of_rig("reading", name, variable, largest, ends, turning=True)
+        yield _rig_term("reading", name, (variable, "rate"), forms)
+
+
+def _rig_term(
+    acts_on: str, name: str, depends_on: tuple[str, ...], forms: Iterator[FrameVariant]
+) -> Effect:
+    about = f"what acts on the {acts_on}, by {' and '.join(depends_on)}"
+    return Effect(
+        name,
+        "picture_frame",
+        about,
+        tuple(forms),
+        of_fabric=False,
+        acts_on=acts_on,
+        depends_on=depends_on,
+    )
 
 
 RIG: dict[str, dict[str, tuple[str, ...]]] = {
@@ -234,27 +260,46 @@ RIG: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """What acts on the reading and the travel, and what its variable is called in a report."""
 
+AGAINST_THE_MOTION = ("displacement",)
+"""What a friction of the rig may depend on; the load cell reads it with the sign of the speed."""
 
-def _of_rig(acts_on: str, name: str, variable: str, reach: float) -> Iterator[FrameVariant]:
-    """Forms of what is added."""
-    for label, own in _added(name, variable):
+
+def _of_rig(
+    acts_on: str,
+    name: str,
+    variable: str,
+    largest: Mapping[str, float],
+    ends: Ends,
+    *,
+    turning: bool = False,
+) -> Iterator[FrameVariant]:
+    """Forms of what is added, ``turning`` its sign with the speed's, rounded where that is slow."""
+    reach, slow = largest[variable], SLOW * largest["speed"]
+    of = (variable, "speed") if turning else (variable,)
+    between = ends.get(variable, (0.0, 1.0))
+    for label, own in _added(name, variable, turning):
+        if own["shape"] == "spline":
+            own |= {"ends": between}
         value = partial(_factor, own)
 
-        def at_reading(p: Values, at: Values, value: Any = value) -> Any:
-            return value(p, max_value(min_value(at[variable] / reach, 1), -1))
+        def added(p: Values, at: Values, value: Any = value) -> Any:
+            size = value(p, max_value(min_value(at[variable] / reach, 1), -1))
+            return size * shape_of("sign", (1.0,), at["speed"], width=slow) if turning else size
 
-        coefficients, numbers = own["coefficients"], own.values()
+        numbers = own.values()
+        parameters = [*own["coefficients"], *(n for n in numbers if isinstance(n, Parameter))]
+        also = {"variable": variable} | ({"slow": slow} if turning else {})
         yield FrameVariant(
             label,
-            (*coefficients, *(n for n in numbers if isinstance(n, Parameter))),
-            shape=Shape(X[variable], Y[acts_on], reach, value, own | {"variable": variable}),
-            of=(variable,),
-            added_reading=at_reading if acts_on == "reading" else None,
-            added_travel=at_reading if acts_on == "travel" else None,
+            tuple(parameters),
+            shape=Shape(X[variable], Y[acts_on], reach, value, own | also, between),
+            of=of,
+            added_reading=added if acts_on == "reading" else None,
+            added_travel=added if acts_on == "travel" else None,
         )
 
 
-def _added(name: str, variable: str) -> Iterator[tuple[str, dict[str, Any]]]:
+def _added(name: str, variable: str, turning: bool) -> Iterator[tuple[str, dict[str, Any]]]:
     """Label and numbers of shapes."""
     one = (Parameter(f"{name}_1", amplitude=True),)
     if variable in ("force_rate", "acceleration"):
@@ -264,9 +309,10 @@ def _added(name: str, variable: str) -> Iterator[tuple[str, dict[str, Any]]]:
         yield "sign", {"shape": "sign", "coefficients": one, "width": SLOW}
         if name.startswith("travel"):
             return
-    for label, coefficients, numbers in _shapes(name, len(SPLINES)):
-        yield label, numbers | {"coefficients": coefficients}
-    if variable in ("time", "displacement"):
+    constant = {"constant": Parameter(f"{name}_0", amplitude=True)} if turning else {}
+    for label, coefficients, numbers in _shapes(name, _wealth(name.partition("_")[0], variable)):
+        yield label, numbers | {"coefficients": coefficients} | constant
+    if variable in ("time", "displacement") and not turning:
         waves = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))
         most = CYCLES[variable]
         periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
