@@ -72,8 +72,8 @@ class Fronts:
         if len(edge):
             parts.append(edge)
         rows, parent = _fronts(parts, pairs)
-        # Where a part is coupled with a separator further up only, it is its own child's elder
-        # sibling: what waits on a stack has to come in postorder.
+        # A part need not be coupled with the separator next to it, and then is below one further up
+        # in the tree of the fronts. What waits on a stack has to come in postorder of that tree.
         order = _postorder(parent)
         if (order != np.arange(len(parts))).any():
             parts = [parts[s] for s in order]
