@@ -70,6 +70,8 @@ class Criteria:
             reported. A fit that ends there has not converged, and says so.
         first_look: evaluations after which it shows which fits are worth going on with; made-up.
         worthwhile: those that leave no more than this many times what the best one does; made-up.
+        hopeless: sigmas of a reading that several effects leave, to first order, beyond which they
+            are not fitted where a single term without a formula leaves noise; made-up.
         far_off: a first start of a form that leaves this many times more than the best start, to
             first order, is not followed; made-up.
         second_start: ... nor a second start that leaves this many times more; made-up.
@@ -112,6 +114,7 @@ class Criteria:
     final_evaluations: int = 300
     first_look: int = 12
     worthwhile: float = 30.0
+    hopeless: float = 3.0
     far_off: float = 30.0
     second_start: float = 4.0
 

@@ -97,7 +97,7 @@ class Screen:
         # What the baseline imitates to round-off has no signature of its own.
         seen = norm > LEFT * np.maximum(np.linalg.norm(C, axis=0), 1e-300)
         C_left = np.where(seen, C_left / np.where(seen, norm, 1.0), 0.0)
-        self._gram, self._by = C_left.T @ C_left, C_left.T @ r
+        self._gram, self._by, self._sum = C_left.T @ C_left, C_left.T @ r, float(r @ r)
         self._positive = np.array(positive)
         self._seen = seen
 
@@ -134,11 +134,20 @@ class Screen:
             count: of sets of effects.
             effects: in each, two or more.
         """
+        chosen = self._ranked(self._sets(effects), count)
+        return [tuple((g.variant, g.signature) for g in one) for one in chosen]
+
+    def least_left(self, effects: int) -> float:
+        """The least sum of squares, white, that any so many effects leave; two or more."""
+        gains = self._gains(self._sets(effects))
+        return self._sum - float(gains.max(initial=0.0))
+
+    def _sets(self, effects: int) -> list[tuple[_Group, ...]]:
+        """All pairs, or what the best of them are with others."""
         sets = self._pairs()
         for _ in range(effects - 2):
             sets = self._with_another(self._ranked(sets, BEST_PAIRS))
-        chosen = self._ranked(sets, count)
-        return [tuple((g.variant, g.signature) for g in one) for one in chosen]
+        return sets
 
     def instead(
         self, kept: Sequence[Variant], others: Sequence[Effect], count: int

@@ -58,11 +58,20 @@ def diagnose_test(
     """
     listed = [e for e in experiment.effects if names is None or e.name in names]
     search = _Search(experiment, listed, progress)
+    if names is not None or not experiment.terms:
+        return search.run()
+    further = _Search(experiment, [*listed, *experiment.terms], progress, most=1)
+    if not experiment.terms_are_rivals:
+        # One term is less than several effects, and sooner found.
+        search.gives_way = further.finds_what_several_do_not
     found = search.run()
-    if names is not None or found.curve is not None or not experiment.terms:
+    if found.curve is not None:
         return found
+    if search.gave_way and further.found is not None:
+        return _beside(further.found, found)
     if not search.accounted:
-        return _beside(_Search(experiment, [*listed, *experiment.terms], progress).run(), found)
+        further.most = None
+        return _beside(further.run(), found)
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
         terms, least = list(experiment.terms), -CRITERIA.decisive
@@ -111,7 +120,7 @@ class _Search:
         most: int | None = None,
     ) -> None:
         self.experiment, self.progress = experiment, progress
-        self.effects, self._most = list(effects), most
+        self.effects, self.most = list(effects), most
         # With what has no formula there are too many to fit them all.
         self._screened_first = any(not effect.listed for effect in effects)
         self.models = Models(experiment, effects)
@@ -122,6 +131,12 @@ class _Search:
         self.effects_needed = 0
         #: Models of one effect, the best first.
         self.singles: Sequence[Model] = ()
+        #: Asked, where one effect does not do, whether another search has found what does.
+        self.gives_way: Callable[[], bool] = lambda: False
+        self.gave_way = False
+        #: What was found so far.
+        self.found: Diagnosis | None = None
+        self._one_by_one: tuple[list[Candidate], list[list[Model]]] | None = None
 
     # Search -------------------------------------------------------------------------------
 
@@ -131,9 +146,10 @@ class _Search:
         for _ in range(CRITERIA.rounds):
             # An outlier is seen better once the large part of the residual is gone.
             nearest = _nearest(levels)
-            if not self.judge.leave_out(nearest.fit):
+            if self.gave_way or not self.judge.leave_out(nearest.fit):
                 break
             self.models.take_noise_from(nearest.fit)
+            self._one_by_one = None
             candidates, levels = self._looked_through()
         baseline = levels[0][0]
         self.singles = levels[1] if len(levels) > 1 else ()
@@ -158,7 +174,7 @@ class _Search:
                 model = self.models.refined(self.judge.weighed(candidate.fit, (candidate.effect,)))
                 candidate.fit, candidate.criterion = model.fit, model.criterion
                 candidate.holdout = self.judge.holdout(candidate.fit)
-        return Diagnosis(
+        self.found = Diagnosis(
             experiment=self.experiment,
             verdict=verdict,
             noise=misfit.noise,
@@ -188,9 +204,50 @@ class _Search:
             laboratories=tuple(self.judge.laboratories(judged.fit, misfit.noise)),
             notes=[*self.experiment.notes, *self._notes(final.fit, baseline.fit)],
         )
+        return self.found
+
+    def finds_what_several_do_not(self) -> bool:
+        """Whether a single term leaves noise, where effects with names leave far more together."""
+        if self.found is None:
+            self.run()
+        found = self.found
+        assert found is not None
+        if found.verdict != "effect_discovered" or len(found.effects) != 1:
+            return False
+        base, variances = self.models.base, found.final.variances
+        linear = ToFirstOrder(self.experiment, base, variances, None)
+        listed = {e: forms for e, forms in self._signatures.items() if e.listed}
+        left = Screen(base, linear, listed).least_left(CRITERIA.most_effects)
+        return left > CRITERIA.hopeless**2 * float(base.used.sum())
 
     def _looked_through(self) -> tuple[list[Candidate], list[list[Model]]]:
         """Candidates by themselves, and models by their number of effects, the best first."""
+        if self._one_by_one is None:
+            self._one_by_one = self._alone()
+        candidates, few = self._one_by_one
+        levels = [list(level) for level in few]
+        most = min(CRITERIA.most_effects, max(2, len(self.experiment.effects) // 2))
+        if self._screened_first:
+            most = self.most or CRITERIA.most_terms
+        for count in range(2, 1 + min(most, len(self.effects))):
+            best = _nearest(levels)
+            if not levels[-1] or self.judge.settled(best, levels[0][0]):
+                break
+            if count == 2:
+                self.gave_way = self.gives_way()
+                if self.gave_way:
+                    break
+            self.progress(0.5 + 0.15 * (count - 2), f"fit {count} effects together")
+            # With noise as the best model leaves it.
+            self.models.take_noise_from(best.fit)
+            self.models.base = self.models.baseline(self.models.base.values)
+            fewer = self.models.with_these_variances(levels[-1][0])
+            levels.append(self._together(count, fewer))
+            self._with_one_less(levels)
+        return candidates, [level for level in levels if level]
+
+    def _alone(self) -> tuple[list[Candidate], list[list[Model]]]:
+        """Candidates by themselves, and models of no effect and of one."""
         self.progress(0.0, "signatures")
         base = self.models.baseline(self.models.start)
         expected, _ = self.experiment.predict((), base.values)
@@ -221,21 +278,7 @@ class _Search:
         for candidate in candidates:
             mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
             candidate.fit = mine[0].fit if mine else None
-        most = min(CRITERIA.most_effects, max(2, len(self.experiment.effects) // 2))
-        if self._screened_first:
-            most = self._most or CRITERIA.most_terms
-        for count in range(2, 1 + min(most, len(self.effects))):
-            best = _nearest(levels)
-            if not levels[-1] or self.judge.settled(best, levels[0][0]):
-                break
-            self.progress(0.5 + 0.15 * (count - 2), f"fit {count} effects together")
-            # With noise as the best model leaves it.
-            self.models.take_noise_from(best.fit)
-            self.models.base = self.models.baseline(self.models.base.values)
-            fewer = self.models.with_these_variances(levels[-1][0])
-            levels.append(self._together(count, fewer))
-            self._with_one_less(levels)
-        return candidates, [level for level in levels if level]
+        return candidates, levels
 
     def _screened(self) -> Screen:
         """All effects to first order about the baseline, with the variances as they are now."""
