@@ -6,6 +6,8 @@ import os
 import sys
 from collections.abc import Sequence
 
+from .processor import choose_kernels
+
 __all__ = ["main"]
 
 
@@ -13,6 +15,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0, 1 for a solve that stopped, 2 for bad input."""
     # Parallelism is MPI's; threads of BLAS on top of it only get in each other's way.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    choose_kernels()
     if not os.environ.get("DISPLAY"):
         # VTK tries an X server first and complains when there is none.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")

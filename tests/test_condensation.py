@@ -21,9 +21,10 @@ from fabric_fenicsx import _dolfinx
 from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.drape import DrapeCase
-from fabric_fenicsx.solving import tangent
+from fabric_fenicsx.solving import remainder, tangent
 from fabric_fenicsx.solving.blocks import BLOCK
 from fabric_fenicsx.solving.discretisation import Discretisation
+from fabric_fenicsx.solving.remainder import ByFronts, ByMumps
 from fabric_fenicsx.solving.tangent import Condensed, Whole, tangent_of
 
 SPEC = importlib.util.spec_from_file_location(
@@ -132,6 +133,69 @@ def test_condensed_and_whole_matrix_have_one_solution(symmetric):
 
 @pytest.mark.mpi
 @KINDS
+def test_held_crossings_keep_what_is_prescribed(symmetric):
+    """Also those on a rank's edge, to which several ranks add."""
+    net = plain_net(3, 4, 4.0, 4)
+    system = Blocks(net, symmetric=symmetric)
+    held = net.crossings.ravel()
+    _, found = both(system, held=held)
+    check(found, 1e-11)
+    disc = system.net
+    b = disc.gather_nodes(right_hand_side(disc).array_r.reshape(-1, BLOCK))
+    assert (found[0][held, 1:3] == b[held, 1:3]).all()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("share", [0.0, -2.0], ids=["definite", "indefinite"])
+def test_symmetric_matrices_are_factorised_by_fronts(share):
+    """Crossings' blocks are K + share K; some lie on the ranks' edges."""
+    net = plain_net(3, 4, 4.0, 4)
+    plain = Blocks(net, symmetric=True)
+    A = plain.net.matrix()
+    plain.tangent(A)
+    added = {}
+    for node in net.crossings[:, 0]:
+        row = (plain.net.node_block[node] * BLOCK + np.arange(BLOCK)).astype(PETSc.IntType)
+        own = np.zeros((BLOCK, BLOCK))
+        if A.getOwnershipRange()[0] <= row[0] < A.getOwnershipRange()[1]:
+            own = A.getValues(row, row)
+        added[int(node)] = share * plain.net.comm.allreduce(own)
+    condensed, found = both(Blocks(net, symmetric=True, added=added))
+    check(found, 1e-9)
+    assert isinstance(condensed._solver, ByFronts)
+    assert condensed._by_mumps is None
+
+
+@pytest.mark.mpi
+def test_long_edges_are_left_to_mumps(monkeypatch):
+    monkeypatch.setattr(remainder, "DENSE", 0)
+    system = Blocks(plain_net(3, 4, 4.0, 4), symmetric=True)
+    condensed, found = both(system)
+    check(found, 1e-11)
+    assert isinstance(condensed._solver, ByFronts if system.net.comm.size == 1 else ByMumps)
+
+
+@pytest.mark.mpi
+def test_without_fronts_it_is_mumps():
+    """Where the option says so, and where they are given up; then one after the other."""
+    system = Blocks(plain_net(3, 4, 4.0, 4), symmetric=True)
+    options = PETSc.Options()
+    options[PREFIX[True] + "fronts"] = "0"
+    by_mumps, found = both(system)
+    options.delValue(PREFIX[True] + "fronts")
+    by_fronts, other = both(system)
+    np.testing.assert_allclose(found[0], other[0], rtol=0, atol=1e-11 * np.abs(other[0]).max())
+    assert isinstance(by_mumps._solver, ByMumps)
+    by_fronts._by_fronts._fronts.factorise = lambda *matrix: False
+    by_fronts.factorise()
+    assert isinstance(by_fronts._solver, ByMumps)
+    del by_fronts._by_fronts._fronts.factorise
+    by_fronts.factorise()
+    assert by_fronts._by_mumps is None
+
+
+@pytest.mark.mpi
+@KINDS
 def test_right_hand_sides_are_solved_for_together(symmetric):
     """As one by one, by the condensed and by the whole matrix."""
     system = Blocks(plain_net(3, 4, 4.0, 4), symmetric=symmetric)
@@ -220,20 +284,20 @@ def test_chains_of_one_bad_tangent_are_tried_again(symmetric):
 def test_no_two_factorisations_lie_side_by_side(monkeypatch, symmetric):
     """That of the chains before is gone when that without one of them is made."""
     there = []
-    make = Condensed._new_solver
+    number = Condensed._number
 
     def noted(self):
-        there.append(bool(getattr(self, "_solver", None)))
-        return make(self)
+        there.append(getattr(self, "_by_fronts", None) or getattr(self, "_by_mumps", None))
+        number(self)
 
-    monkeypatch.setattr(Condensed, "_new_solver", noted)
+    monkeypatch.setattr(Condensed, "_number", noted)
     system = Blocks(plain_net(3, 4, 4.0, 4), symmetric=symmetric)
     condensed, _ = both(system)
     system.size = 0.0
     condensed.assemble()
     condensed.factorise()
     assert condensed.refused.any()
-    assert there == [False, False]
+    assert there == [None, None]
 
 
 @pytest.mark.mpi

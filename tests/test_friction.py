@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from fabric_fenicsx import _dolfinx
 from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.fabric.section import RectangularSection
 from fabric_fenicsx.mechanics.contact import root
 from fabric_fenicsx.mechanics.tools import HoledPlate
+from fabric_fenicsx.solving import contacts
 from fabric_fenicsx.solving.contacts import ContactLaw
 from fabric_fenicsx.solving.generalised_alpha import GeneralisedAlpha
 from fabric_fenicsx.solving.model import Model, Support
@@ -169,3 +171,60 @@ def test_capstan_does_not_depend_on_the_step():
 def test_smooth_drum_passes_the_load_on():
     """Without friction T2 = T1: the twin that must not show the capstan's ratio."""
     assert over_a_drum(20, mu=1e-9)[-1] == pytest.approx(1.0, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("friction", "large", "symmetric"),
+    [(MU, 1, True), (2.0 * contacts.LOW_FRICTION, 1, False), (MU, contacts.LARGE, False)],
+)
+def test_large_nets_have_the_symmetric_part_of_a_low_friction(
+    monkeypatch, friction, large, symmetric
+):
+    """A bent tow pushed across a plane, some nodes of which slip and some stick.
+
+    With K e the residual's derivative in a direction e, by central differences, the tangent K̂ has
+    d · K̂ e = d · K e; of its symmetric part d · K̂ e = (d · K e + e · K d)/2.
+    """
+    monkeypatch.setattr(contacts, "LARGE", large)
+    law = ContactLaw(stiffness=0.5, layer=0.5, friction=friction, stick_stiffness=0.5)
+    plane = HoledPlate("plane", lambda time: (1e4, 0.0, 0.2), 1.0, 1.0, side=1.0)
+    net = single_tow(
+        np.column_stack([np.linspace(0.0, 30.0, 6), np.zeros((6, 2))]), (0.0, 0.0, 1.0)
+    )
+    model = Model(net, SECTION, tools=[plane], contact_law=law)
+    system, disc = model.system, model.disc
+    assert system.symmetric == symmetric
+    rng = np.random.default_rng(4)
+    w = np.zeros((6, 6))
+    w[:, 0], w[:, 1], w[:, 2] = 0.02, np.linspace(0.0, 0.4, 6), rng.normal(0.0, 0.02, 6)
+    d, e = np.zeros((2, 6, 6))
+    d[:, :3], e[:, :3] = rng.normal(size=(2, 6, 3))
+
+    def friction_forces(step):
+        x = disc.vector()
+        x.array[:] = (w + step).ravel()
+        system.set_increment(x)
+        return system.term_forces("plane friction")
+
+    def slope(direction, h=1e-6):
+        return (friction_forces(h * direction) - friction_forces(-h * direction)) / (2.0 * h)
+
+    by_differences = np.vdot(d, slope(e)), np.vdot(e, slope(d))
+    friction_forces(0.0 * w)
+    term = next(t for t in system.terms if t.name == "plane friction")
+    K = disc.matrix()
+    K.setLGMap(*disc.maps()[:1] * 2)
+    _dolfinx.add_matrix(K, _dolfinx.compile_form(term.tangent, disc.comm))
+    K.assemble()
+
+    def product(left, right):
+        x, y = disc.vector(), disc.vector()
+        x.array[:] = right.ravel()
+        K.mult(x, y)
+        return float(np.vdot(left, y.array_r.reshape(6, 6)))
+
+    found = product(d, e), product(e, d)
+    # The two differ: friction's own tangent is not symmetric.
+    assert abs(by_differences[0] - by_differences[1]) > 0.1 * abs(by_differences[0])
+    wanted = (np.mean(by_differences),) * 2 if symmetric else by_differences
+    assert found == pytest.approx(wanted, rel=1e-6)

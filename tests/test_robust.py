@@ -309,7 +309,7 @@ def test_what_is_free_goes_back_to_the_system():
     """Also where something that stays was put behind it; a library of PETSc's would keep it."""
     code = """
 import numpy as np
-from fabric_fenicsx.solving.tangent import give_back
+from fabric_fenicsx.solving.direct import give_back
 def resident():
     pages = open("/proc/self/statm").read().split()[1]
     return 4096 * int(pages)

@@ -385,6 +385,17 @@ def test_two_terms_of_the_travel_add(tmp_path):
         np.testing.assert_allclose(together[name], alone, atol=1e-5 * np.abs(alone).max())
 
 
+def test_one_term_spares_the_fits_of_several_listed_effects(tmp_path):
+    """Which to first order leave far more than noise: none is tried in a model with another."""
+    done = []
+    measurement = read_measurement(write(tmp_path / "set", 0.0, permanent=1.0))
+    report = diagnose([measurement], progress=lambda share, what: done.append(what)).report
+    assert report["verdict"] == "effect_discovered"
+    (term,) = report["discovered"]
+    assert term["acts_on"] == "moment" and term["depends_on"] == ["largest_angle"]
+    assert not any("effects together" in what for what in done)
+
+
 def test_where_nothing_wears_nothing_is_discovered(tmp_path):
     report = diagnose([read_measurement(write(tmp_path / "set", 0.0))]).report
     assert report["verdict"] == "no_effect" and report["discovered"] == []

@@ -15,7 +15,7 @@ from ufl import derivative
 
 from .fields import ConnectorFields, TowFields
 
-__all__ = ["Term", "energy_term", "side_by_side", "work_term"]
+__all__ = ["Term", "energy_term", "side_by_side", "symmetric_part", "work_term"]
 
 Where = Literal["tows", "crossovers"]
 
@@ -66,6 +66,13 @@ def work_term(
     if tangent is None:
         tangent = derivative(residual, fields.w, fields.trial)
     return Term(name, _where(fields), residual, tangent, energy, loss, symmetric)
+
+
+def symmetric_part(form: Any) -> Any:
+    """(a(v, w) + a(w, v))/2 of a bilinear form, which Newton may use in the place of a(v, w)."""
+    test, trial = form.arguments()
+    a = ufl.algorithms.expand_derivatives(form)
+    return 0.5 * a + 0.5 * ufl.replace(a, {test: trial, trial: test})
 
 
 def side_by_side(integrals: Sequence[Any], space: Any) -> Any:

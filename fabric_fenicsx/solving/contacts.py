@@ -10,12 +10,12 @@ from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
-from ufl import as_vector, max_value
+from ufl import as_vector, derivative, max_value
 
 from .. import _dolfinx
 from .._dolfinx import Function
 from ..mechanics import beam, contact
-from ..mechanics.terms import Term, energy_term, work_term
+from ..mechanics.terms import Term, energy_term, symmetric_part, work_term
 from ..mechanics.tools import SampledTool, Tool
 from .discretisation import BLOCK, Discretisation
 from .history import Histories
@@ -24,6 +24,13 @@ from .pressed import PressedTool
 __all__ = ["ContactLaw", "Contacts"]
 
 Array = npt.NDArray[np.float64]
+
+#: Coefficients up to which, and nodes of a net from which on, Newton has the symmetric part of
+#: friction's tangent, which is factorised at less than half the cost. What is left out comes from
+#: the limit μ p, at most μ/2 times the contact's stiffness, and makes convergence linear: a drape
+#: of 2400 nodes took 1, 4 and 5 % more iterations at μ = 0.1, 0.2 and 0.35, at 0.6 19 %. Smaller
+#: nets take most of their time otherwise.
+LOW_FRICTION, LARGE = 0.4, 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +140,20 @@ class Contacts:
                 )
                 work = contact.traction_work(tows, traction)
                 loss = contact.traction_loss(tows, traction, shift)
-                self.terms.append(work_term(f"{tool.name} friction", tows, work, loss=loss))
+                tangent = derivative(work, tows.w, tows.trial)
+                symmetric = law.friction <= LOW_FRICTION and len(disc.net.points) >= LARGE
+                if symmetric:
+                    tangent = symmetric_part(tangent)
+                self.terms.append(
+                    work_term(
+                        f"{tool.name} friction",
+                        tows,
+                        work,
+                        tangent,
+                        loss=loss,
+                        symmetric=symmetric,
+                    )
+                )
                 histories.add(f"{tool.name}: traction", "nodes", traction_n, traction)
             if tool.name in pressed:
                 self.pressed[tool.name] = PressedTool(

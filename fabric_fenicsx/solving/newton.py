@@ -29,6 +29,9 @@ __all__ = ["Newton", "Outcome"]
 #: will not come back: early in a step stiff tows make it rise by orders, growth alone is no sign.
 RUNAWAY = 1e2
 
+#: So many times that at any iteration but the first: nothing is left of the step.
+LOST = 1e8
+
 #: A factorisation serves once more where the residual, if it fell again by the factor it fell by
 #: last, would be below this share of the tolerance: the tangent has then hardly changed.
 ENOUGH = 0.01
@@ -297,7 +300,7 @@ class Newton:
             return int(reasons.CONVERGED_FNORM_ABS)
         history = self._history
         since = len(history) - 1
-        if since > 3 and residual > RUNAWAY * max(history[:2]):
+        if residual > (RUNAWAY if since > 3 else LOST) * max(history[:2]):
             return int(reasons.DIVERGED_DTOL)
         if since > PATIENCE and min(history[-PATIENCE:]) > min(history[1:-PATIENCE]) / 2.0:
             return int(reasons.DIVERGED_DTOL)

@@ -17,7 +17,7 @@ Integers = npt.NDArray[np.int64]
 SMALL = 6
 
 
-def nested_dissection(points: npt.NDArray[np.float64], pairs: Integers) -> Integers:
+def nested_dissection(points: npt.NDArray[np.float64], pairs: Integers) -> list[Integers]:
     """An order of elimination: both halves of the net first, then what separates them, and so on.
 
     Args:
@@ -25,7 +25,7 @@ def nested_dissection(points: npt.NDArray[np.float64], pairs: Integers) -> Integ
         pairs: nodes that are coupled, (n_pairs, 2).
 
     Returns:
-        The nodes in the order in which they are to be eliminated, (n,).
+        The nodes of each part and separator, in the order in which they are to be eliminated.
     """
     side = np.zeros(len(points), dtype=np.int8)
 
@@ -50,4 +50,4 @@ def nested_dissection(points: npt.NDArray[np.float64], pairs: Integers) -> Integ
         within = [inside[side[inside[:, 0]] == half] for half in (0, 1)]
         return [*dissected(parts[0], within[0]), *dissected(parts[1], within[1]), separator]
 
-    return np.concatenate(dissected(np.arange(len(points)), pairs))
+    return [part for part in dissected(np.arange(len(points)), pairs) if len(part)]

@@ -25,8 +25,9 @@ from .. import _dolfinx
 from ..errors import SolveError
 from ..mechanics.fields import TowFields
 from ..mechanics.terms import side_by_side
+from .direct import fail
 from .discretisation import Discretisation
-from .tangent import Condensed, Whole, fail
+from .tangent import Condensed, Whole
 
 __all__ = ["Dyad", "DyadicLU", "PressedTool"]
 

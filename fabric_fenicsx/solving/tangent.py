@@ -21,13 +21,14 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
-from .blocks import BLOCK, block_matrix, expand
+from .blocks import BLOCK, expand
 from .condensation import Elimination, Runs, inner_nodes
+from .direct import destroy, ordering, petsc, solved, solver
 from .discretisation import Discretisation
-from .ordering import nested_dissection
+from .remainder import ByFronts, ByMumps, Left
 from .system import System
 
-__all__ = ["Condensed", "Whole", "fail", "give_back", "tangent_of"]
+__all__ = ["Condensed", "Whole", "tangent_of"]
 
 Array = npt.NDArray[np.float64]
 
@@ -84,7 +85,7 @@ class Whole:
         system.tangent(self._A)
         self.matrix = self._A.duplicate()
         self.unknowns = self.matrix.getSize()[0]
-        self._new_solver = lambda: _solver(net.comm, prefix, symmetric, **_ordering(net.comm))
+        self._new_solver = lambda: solver(net.comm, prefix, symmetric, **ordering(net.comm))
         self._solver = self._new_solver()
 
     def assemble(self) -> None:
@@ -108,7 +109,7 @@ class Whole:
 
     def solve(self, rights: Sequence[PETSc.Vec], solutions: Sequence[PETSc.Vec]) -> bool:
         """Solve by the last factorisation, together; whether it served. Collective."""
-        found = _solved(self._solver, [b.array_r for b in rights])
+        found = solved(self._solver, [b.array_r for b in rights])
         if found is None:
             # PETSc does not get over every error of a factor.
             self._solver.destroy()
@@ -120,7 +121,7 @@ class Whole:
 
     def destroy(self) -> None:
         """Give back the matrices and the factorisation. Collective."""
-        _destroy(self._solver, self._A, self.matrix)
+        destroy(self._solver, self._A, self.matrix)
 
 
 class Condensed:
@@ -141,7 +142,7 @@ class Condensed:
         net = self._net = system.net
         self._system, self._symmetric, self._prefix = system, symmetric, prefix
         self._functions = functions
-        self._dissected = not symmetric and net.comm.size == 1
+        self._may_front = PETSc.Options().getBool(prefix + "fronts", True)
         shape = (net.owned * BLOCK, len(net.net.points) * BLOCK)
         self.matrix = PETSc.Mat().createAIJ((shape, shape), nnz=0, comm=net.comm)
         self.matrix.assemble()
@@ -151,6 +152,7 @@ class Condensed:
         self._here = PETSc.Scatter().create(free, rows, self._x, None)
         self._here.scatter(free, self._x)
         self._free = self._x.array_r.copy()
+        self._held = free.array_r == 0.0
         # A matrix has its pattern once it has been filled.
         system.tangent(self._A)
         self.refused: npt.NDArray[np.bool_] = np.zeros(len(net.net.points), dtype=bool)
@@ -170,21 +172,9 @@ class Condensed:
         left = by_block[~inner[by_block]]
         number = np.full(len(net.points), -1)
         number[left] = np.arange(len(left))
-        if self._dissected:
-            left = left[nested_dissection(net.points[left], number[pairs])]
-            number[left] = np.arange(len(left))
         here = by_block[disc.own_blocks]
         own = left[owner[left] == disc.comm.rank]
         self._kept = disc.node_block[own] - (disc.own_blocks[0] if disc.owned else 0)
-        self._R = block_matrix(
-            disc.comm,
-            number[pairs],
-            len(own),
-            symmetric=self._symmetric,
-            kind=PETSc.Mat.Type.AIJ if self._dissected else PETSc.Mat.Type.BAIJ,
-        )
-        self._scale = self._R.createVecLeft()
-        self._solver = self._new_solver()
         self.unknowns = len(left) * BLOCK
 
         self._runs = runs.only(owner[runs.ends[:, 0]] == disc.comm.rank)
@@ -199,26 +189,35 @@ class Condensed:
             number[here],
             self._symmetric,
         )
-        self._places = [part.astype(PETSc.IntType)[:, None] for part in self._elimination.places]
+        self._left = Left(
+            disc.comm,
+            net.points[left],
+            number[pairs],
+            here=np.unique(np.concatenate([*self._elimination.places, number[own]])),
+            own=number[own],
+            places=self._elimination.places,
+            symmetric=self._symmetric,
+        )
+        self._by_fronts = ByFronts.of(self._left) if self._may_front else None
+        self._by_mumps: ByMumps | None = None
 
     def _renumber(self) -> None:
         """The same with other chains."""
         # First, or two factorisations would lie side by side.
-        _destroy(self._solver, self._R, self._scale)
+        self._forget()
         self._number()
+
+    def _forget(self) -> None:
+        """Give back the factorisations. Collective."""
+        for part in (self._by_fronts, self._by_mumps):
+            if part is not None:
+                part.destroy()
+        self._by_fronts = self._by_mumps = None
 
     def destroy(self) -> None:
         """Give back the matrices and the factorisation. Collective."""
-        _destroy(self._solver, self._R, self._A, self.matrix)
-
-    def _new_solver(self) -> PETSc.KSP:
-        comm, symmetric = self._net.comm, self._symmetric
-        # MUMPS takes the order as given, for LU of scalar matrices on one rank only.
-        ordering = (
-            {"pc_factor_mat_ordering_type": "natural"} if self._dissected else _ordering(comm)
-        )
-        prefix = self._prefix + "condensed_"
-        return _solver(comm, prefix, symmetric, mat_mumps_icntl_8=0, **ordering)
+        self._forget()
+        destroy(self._A, self.matrix)
 
     def assemble(self) -> None:
         """Assemble the tangent at the increment and section forces set last. Collective."""
@@ -247,95 +246,34 @@ class Condensed:
             self.refused[np.concatenate(found)] = True
             self._since = 0
             self._renumber()
-        R, elimination = self._R, self._elimination
-        R.zeroEntries()
-        R.setValuesBlockedRCV(*self._places, elimination.left, addv=PETSc.InsertMode.ADD_VALUES)
-        R.assemble()
-        # In place of MUMPS' own scaling, which takes longer; powers of two round nothing.
-        R.getDiagonal(self._scale)
-        size = np.abs(self._scale.array_r)
-        self._scale.array[:] = np.exp2(np.rint(-0.5 * np.log2(np.where(size > 0.0, size, 1.0))))
-        R.diagonalScale(self._scale, self._scale)
-        self._solver.setOperators(R)
-        self._solver.setUp()
+        blocks = self._elimination.left
+        self._solver: ByFronts | ByMumps
+        if self._by_fronts is not None and self._by_fronts.factorise(blocks):
+            if self._by_mumps is not None:
+                self._by_mumps.destroy()
+                self._by_mumps = None
+            self._solver = self._by_fronts
+            return
+        if self._by_mumps is None:
+            self._by_mumps = ByMumps(self._left, self._prefix + "condensed_")
+        self._by_mumps.factorise(blocks)
+        self._solver = self._by_mumps
 
     def solve(self, rights: Sequence[PETSc.Vec], solutions: Sequence[PETSc.Vec]) -> bool:
         """Solve by the last factorisation, together; whether it served. Collective."""
-        scale = self._scale.array_r
-        reduced = [b.array_r.copy() for b in rights]
+        reduced = np.array([b.array_r for b in rights])
         for g in reduced:
             self._elimination.forward(g)
-        left = [g.reshape(-1, BLOCK)[self._kept].ravel() * scale for g in reduced]
-        found = _solved(self._solver, left)
+        nodes = reduced.reshape(len(rights), -1, BLOCK)
+        found = self._solver.solve(nodes[:, self._kept])
         if found is None:
-            self._solver.destroy()
-            self._solver = self._new_solver()
             return False
-        for y, g, z in zip(solutions, reduced, found, strict=True):
-            g.reshape(-1, BLOCK)[self._kept] = (z * scale).reshape(-1, BLOCK)
+        nodes[:, self._kept] = found
+        for b, y, g in zip(rights, solutions, reduced, strict=True):
             self._elimination.backward(g)
-            y.array[:] = g
+            # Of what is held on a rank's edge every rank has a one on the diagonal.
+            y.array[:] = np.where(self._held, b.array_r, g)
         return True
-
-
-def _solver(comm: MPI.Comm, prefix: str, symmetric: bool, **more: Any) -> PETSc.KSP:
-    """MUMPS, unless PETSc's options say otherwise."""
-    options = PETSc.Options()
-    for key, value in {
-        "ksp_type": "preonly",
-        "pc_type": "cholesky" if symmetric else "lu",
-        "pc_factor_mat_solver_type": "mumps",
-        # Room for pivoting.
-        "mat_mumps_icntl_14": 50,
-        **more,
-    }.items():
-        if not options.hasName(prefix + key):
-            options[prefix + key] = value
-    solver = PETSc.KSP().create(comm)
-    solver.setOptionsPrefix(prefix)
-    solver.setFromOptions()
-    return solver
-
-
-def _solved(solver: PETSc.KSP, rights: Sequence[Array]) -> list[Array] | None:
-    """Solutions for right-hand sides on this rank's rows; None where the factorisation failed.
-
-    By a direct solver several at once take hardly longer than one. Collective.
-    """
-    # That of the factorisation; one that succeeded has none or the last solution's.
-    if solver.getConvergedReason() < 0:
-        return None
-    pc = solver.getPC()
-    direct = solver.getType() == "preonly" and pc.getType() in ("lu", "cholesky")
-    found = []
-    if direct and len(rights) > 1:
-        rows = solver.getOperators()[0].getSizes()[0]
-        columns = (PETSc.DECIDE, len(rights))
-        B = PETSc.Mat().createDense((rows, columns), comm=solver.getComm())
-        B.setUp()
-        B.getDenseArray()[:] = np.column_stack(rights)
-        B.assemble()
-        X = B.duplicate()
-        pc.getFactorMatrix().matSolve(B, X)
-        found = list(X.getDenseArray().T.copy())
-        B.destroy()
-        X.destroy()
-        return found
-    b, x = solver.getOperators()[0].createVecs()
-    for right in rights:
-        b.array[:] = right
-        solver.solve(b, x)
-        if solver.getConvergedReason() < 0:
-            return None
-        found.append(x.array_r.copy())
-    b.destroy()
-    x.destroy()
-    return found
-
-
-def _ordering(comm: MPI.Comm) -> dict[str, int]:
-    """MUMPS' ordering found best on these nets: METIS (PORD without it), on several ranks PORD."""
-    return {"mat_mumps_icntl_7": 5 if comm.size == 1 else 4}
 
 
 def _owners(disc: Discretisation) -> npt.NDArray[np.int64]:
@@ -344,40 +282,11 @@ def _owners(disc: Discretisation) -> npt.NDArray[np.int64]:
     return np.searchsorted(last, disc.node_block, side="right")
 
 
-def _destroy(*objects: Any) -> None:
-    """Destroy PETSc's objects; what they held goes back to the system. Collective."""
-    for one in objects:
-        one.destroy()
-    give_back()
-
-
-def give_back() -> None:
-    """Have malloc return what is free to the system.
-
-    SuperLU_DIST, to which Debian's PETSc is linked, tells it to keep everything when it is loaded.
-    """
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)
-
-
-@cache
-def _petsc() -> ctypes.CDLL:
-    """PETSc's own functions, for what petsc4py does not offer in all of its versions."""
-    return ctypes.CDLL(PETSc.__file__)
-
-
-def fail(pc: PETSc.PC) -> None:
-    """Make a solver with a preconditioner of type python stop as after a failed factorisation."""
-    reason = ctypes.c_int(int(PETSc.PC.FailedReason.OTHER))
-    _petsc().PCSetFailedReason(ctypes.c_void_p(pc.handle), reason)
-
-
 def _stored_blocks(A: PETSc.Mat) -> npt.NDArray[np.float64]:
     """The values of a matrix on one rank as they are stored: by blocks, each by columns."""
     kind = "SBAIJ" if A.getType().endswith("sbaij") else "BAIJ"
     values = ctypes.POINTER(ctypes.c_double)()
-    get = getattr(_petsc(), f"MatSeq{kind}GetArray")
+    get = getattr(petsc(), f"MatSeq{kind}GetArray")
     get(ctypes.c_void_p(A.handle), ctypes.byref(values))
     return np.ctypeslib.as_array(values, (int(A.getInfo()["nz_used"]),))
 

@@ -98,6 +98,7 @@ class Judge:
         effects: that may be found.
 
     Attributes:
+        experiment: the test.
         outliers: readings that are left out, (n,).
         given: one sigma of a reading as it was stated; None where it was not.
         compared: whether criteria are of the largest likelihood; see estimate. Terms without a
@@ -105,7 +106,7 @@ class Judge:
     """
 
     def __init__(self, experiment: Experiment, effects: list[Effect]) -> None:
-        self._experiment, self._readings = experiment, experiment.readings
+        self.experiment, self._readings = experiment, experiment.readings
         self._effects = effects
         self.outliers: Flags = np.zeros(len(self._readings.observed), dtype=bool)
         self.given = experiment.noise
@@ -133,7 +134,7 @@ class Judge:
         found = self._standing_out(model, noise)
         suspected = self._standing_out(model, Noise(noise.floor)) & model.used
         if (suspected & ~found).any():
-            others = linearised(self._experiment, model).without(suspected)
+            others = linearised(self.experiment, model).without(suspected)
             noise = self._estimated(others, model.variances).variances.noise
             found = self._standing_out(model, noise)
         changed = bool((found != self.outliers)[self._readings.fit].any())
@@ -154,7 +155,7 @@ class Judge:
 
     def components(self, model: Fit, *, smooth: bool = False, compared: bool = False) -> Estimate:
         """Variance components of a fitted model; see estimate."""
-        at = linearised(self._experiment, model)
+        at = linearised(self.experiment, model)
         return self._estimated(at, model.variances, smooth=smooth, compared=compared)
 
     def _estimated(
@@ -172,7 +173,7 @@ class Judge:
     def averaged(self, model: Model) -> Variances:
         """Components of a model for its standard errors."""
         return averaged(
-            linearised(self._experiment, model.fit),
+            linearised(self.experiment, model.fit),
             model.estimate,
             given=self.given,
             usual_scatter=self._usual,
@@ -330,7 +331,7 @@ class Judge:
         key = (model, True)
         if key not in self._validated:
             parts = parts_by(self._readings.run, model.used)
-            self._validated[key] = cross_validated(self._experiment, model, parts)
+            self._validated[key] = cross_validated(self.experiment, model, parts)
         return self._validated[key]
 
     def by_stretches(self, model: Fit) -> CrossValidation:
@@ -338,7 +339,7 @@ class Judge:
         key = (model, False)
         if key not in self._validated:
             parts = stretches(self._readings, model.used)
-            self._validated[key] = cross_validated(self._experiment, model, parts)
+            self._validated[key] = cross_validated(self.experiment, model, parts)
         return self._validated[key]
 
     def laboratories(self, model: Fit, noise: float) -> list[Laboratory]:
@@ -347,7 +348,7 @@ class Judge:
         folder = self._readings.folder
         parts = parts_by(folder, model.used)
         for part in parts if len(parts) > 1 else ():
-            other = fitted_without(self._experiment, model, part)
+            other = fitted_without(self.experiment, model, part)
             error = expected = float("nan")
             if other is not None:
                 error = other.rms(part)

@@ -10,7 +10,8 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 
 Where no effect with a name accounts for the fitted readings the same is done with terms without a
 formula beside them: what acts on what, and by what does it go? Where a single one does, such terms
-may be its rivals (see Experiment.terms_are_rivals).
+may be its rivals (see Experiment.terms_are_rivals). Before several effects with a name are fitted
+together a single term is looked for: if it leaves noise, and they far more, they are not.
 """
 
 from __future__ import annotations
@@ -20,25 +21,19 @@ from collections.abc import Callable, Sequence
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
-from .diagnosis import Beside, Candidate, Diagnosis, Verdict
+from .diagnosis import Candidate, Diagnosis, Verdict
 from .effects import Effect
-from .experiment import Another, Experiment
+from .experiment import Experiment
 from .fitting import Fit, fit
 from .judge import Model
 from .models import Models
 from .noise import quantum
+from .notes import errors_beside, noise_source, notes_of
 from .rivals import near, nearest_forms, pairs_of, rivals_of
 from .screen import Screen
 from .starts import Combination, ToFirstOrder, signatures
-from .validation import has_own
 
 __all__ = ["diagnose_test"]
-
-#: Said where a run has parameters of its own.
-OWN_ZERO = (
-    "A load cell's zero, and its drift, of each run: in a run that is not fitted they are taken "
-    "from its own readings, so that its error tests the shape of the force, not where it begins."
-)
 
 
 def diagnose_test(
@@ -178,7 +173,7 @@ class _Search:
             experiment=self.experiment,
             verdict=verdict,
             noise=misfit.noise,
-            noise_source=self._noise_source(misfit.reading),
+            noise_source=noise_source(self.judge, misfit.reading),
             noise_model=judged.estimate.variances.noise,
             quantum=quantum(self.experiment.readings, self.judge.rows),
             baseline=baseline.fit,
@@ -200,9 +195,9 @@ class _Search:
             criterion_after=final.criterion,
             curve=curve,
             of_the_curve=of_the_curve,
-            others=self._others(baseline.fit, final.fit, nearest.fit, misfit.noise),
+            others=errors_beside(self.judge, baseline.fit, final.fit, nearest.fit, misfit.noise),
             laboratories=tuple(self.judge.laboratories(judged.fit, misfit.noise)),
-            notes=[*self.experiment.notes, *self._notes(final.fit, baseline.fit)],
+            notes=[*self.experiment.notes, *notes_of(self.judge, final.fit, baseline.fit)],
         )
         return self.found
 
@@ -403,50 +398,6 @@ class _Search:
         singles = levels[1] if len(levels) > 1 else []
         limit = min((m.criterion for m in singles), default=0.0) + CRITERIA.decisive
         return tuple(dict.fromkeys(m.effects[0].name for m in singles if m.criterion < limit))
-
-    # Words --------------------------------------------------------------------------------
-
-    def _others(self, before: Fit, after: Fit, best: Fit, noise: float) -> tuple[Beside, ...]:
-        """Errors in the quantities beside the first."""
-
-        def errors(model: Fit, other: Another) -> tuple[float, float]:
-            fitted, held = model.rms(model.used & other.rows), self.judge.holdout(model, other.rows)
-            return fitted / other.unit, held / other.unit
-
-        return tuple(
-            Beside(a.name, errors(before, a), errors(after, a), errors(best, a), noise / a.unit)
-            for a in self.experiment.readings.others
-        )
-
-    def _noise_source(self, noise: float) -> str:
-        given = self.judge.given
-        if given is None:
-            source = "estimated from what readings next to each other differ by"
-        elif noise == given:
-            source = "given"
-        else:
-            source = f"estimated, as readings scatter by other than the {given:.3g} that is stated"
-        if self.experiment.readings.model_error is not None:
-            source += f": {noise:.3g}; and the model's own error"
-        return source
-
-    def _notes(self, chosen: Fit, baseline: Fit) -> list[str]:
-        """What a reader has to know of how the reported model was come by."""
-        notes = [OWN_ZERO] if has_own(chosen.variants) else []
-        models = [(baseline, "baseline")]
-        models += [(chosen, "reported model")] if chosen is not baseline else []
-        for model, name in models:
-            if not model.converged:
-                notes.append(f"The fit of the {name} has not converged: its numbers are not final.")
-            if self.judge.held_rows.any():
-                continue
-            folds = self.judge.left_out(model)
-            if folds.failed:
-                notes.append(
-                    f"Cross-validation of the {name}: {folds.failed} of {folds.parts} parts could "
-                    "not be predicted from the others and are not in its error."
-                )
-        return notes
 
 
 def _nearest(levels: Sequence[Sequence[Model]]) -> Model:

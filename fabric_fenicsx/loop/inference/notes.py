@@ -1,0 +1,73 @@
+"""What a reader of a diagnosis has to know beside the verdict."""
+
+from __future__ import annotations
+
+from .diagnosis import Beside
+from .experiment import Another
+from .fitting import Fit
+from .judge import Judge
+from .validation import has_own
+
+__all__ = ["errors_beside", "noise_source", "notes_of"]
+
+#: Said where a run has parameters of its own.
+OWN_ZERO = (
+    "A load cell's zero, and its drift, of each run: in a run that is not fitted they are taken "
+    "from its own readings, so that its error tests the shape of the force, not where it begins."
+)
+
+
+def errors_beside(
+    judge: Judge, before: Fit, after: Fit, best: Fit, noise: float
+) -> tuple[Beside, ...]:
+    """Errors of three models in the quantities beside the first.
+
+    Args:
+        judge: of the test.
+        before: the baseline.
+        after: the reported model.
+        best: the one that came nearest.
+        noise: one sigma of a reading of the first quantity.
+    """
+
+    def errors(model: Fit, other: Another) -> tuple[float, float]:
+        fitted, held = model.rms(model.used & other.rows), judge.holdout(model, other.rows)
+        return fitted / other.unit, held / other.unit
+
+    return tuple(
+        Beside(a.name, errors(before, a), errors(after, a), errors(best, a), noise / a.unit)
+        for a in judge.experiment.readings.others
+    )
+
+
+def noise_source(judge: Judge, noise: float) -> str:
+    """Where one sigma of a reading, ``noise``, is from."""
+    given, model_error = judge.given, judge.experiment.readings.model_error
+    if given is None:
+        source = "estimated from what readings next to each other differ by"
+    elif noise == given:
+        source = "given"
+    else:
+        source = f"estimated, as readings scatter by other than the {given:.3g} that is stated"
+    if model_error is not None:
+        source += f": {noise:.3g}; and the model's own error"
+    return source
+
+
+def notes_of(judge: Judge, chosen: Fit, baseline: Fit) -> list[str]:
+    """How the reported model was come by, where that limits what it says."""
+    notes = [OWN_ZERO] if has_own(chosen.variants) else []
+    models = [(baseline, "baseline")]
+    models += [(chosen, "reported model")] if chosen is not baseline else []
+    for model, name in models:
+        if not model.converged:
+            notes.append(f"The fit of the {name} has not converged: its numbers are not final.")
+        if judge.held_rows.any():
+            continue
+        folds = judge.left_out(model)
+        if folds.failed:
+            notes.append(
+                f"Cross-validation of the {name}: {folds.failed} of {folds.parts} parts could "
+                "not be predicted from the others and are not in its error."
+            )
+    return notes
