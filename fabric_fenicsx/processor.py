@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from pathlib import Path
 
 __all__ = ["choose_kernels", "kernels"]
@@ -39,7 +40,13 @@ def kernels(cpuinfo: str) -> str | None:
 
 
 def choose_kernels() -> None:
-    """Tell an OpenBLAS that is not loaded yet, unless the environment tells it already."""
+    """Tell an OpenBLAS that is not loaded yet, unless the environment tells it already.
+
+    Where numpy has loaded it, only processes that are started later would hear of it, and round
+    otherwise than this one.
+    """
+    if "numpy" in sys.modules:
+        return
     try:
         with Path("/proc/cpuinfo").open() as file:
             found = kernels(file.read(1 << 14))

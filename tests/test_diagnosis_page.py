@@ -203,6 +203,7 @@ REPORT = {
         "stated": None,
         "other_than_stated": False,
         "other_than_white": False,
+        "correlation": 0.0,
     },
     "laboratories": [],
     "own_of_runs": False,
@@ -241,6 +242,8 @@ def test_the_headline_says_what_noise_is():
     noise |= {"other_than_stated": True, "other_than_white": True}
     said = headline(REPORT | {"noise_model": noise})
     assert "other than the 0.02 N stated" in said and "The noise is correlated." in said
+    assert "misfit" not in said
+    assert "misfit" in headline(REPORT | {"noise_model": noise | {"correlation": 0.9}})
     error = REPORT["error"] | {"after": {"fit": 0.05, "holdout": 0.2}}
     assert "(0.19 N expected)" in headline(REPORT | {"error": error, "holdout_expected": 0.19})
 

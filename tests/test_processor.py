@@ -46,3 +46,13 @@ def test_the_command_line_tells_openblas_unless_told(given):
     )
     done = subprocess.run([sys.executable, "-c", script], env=env, capture_output=True, text=True)
     assert done.stderr.split()[-1] == str(wanted)
+
+
+def test_nothing_is_told_where_numpy_is_loaded():
+    script = (
+        "import numpy, os; from fabric_fenicsx.processor import choose_kernels\n"
+        f"choose_kernels(); print(os.environ.get({CHOICE!r}))"
+    )
+    env = {k: v for k, v in os.environ.items() if k != CHOICE}
+    done = subprocess.run([sys.executable, "-c", script], env=env, capture_output=True, text=True)
+    assert done.stdout.split() == ["None"]
