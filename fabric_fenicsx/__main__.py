@@ -10,12 +10,18 @@ from .processor import choose_kernels
 
 __all__ = ["main"]
 
+#: Commands that factorise large matrices. Faster kernels go by where arrays lie in memory, so that
+#: their last digits differ from run to run: no gain to a diagnosis, which reports the same twice.
+SOLVING = ("run", "converge")
+
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0, 1 for a solve that stopped, 2 for bad input."""
     # Parallelism is MPI's; threads of BLAS on top of it only get in each other's way.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    choose_kernels()
+    given = sys.argv[1:] if arguments is None else arguments
+    if given and given[0] in SOLVING:
+        choose_kernels()
     if not os.environ.get("DISPLAY"):
         # VTK tries an X server first and complains when there is none.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
