@@ -10,9 +10,10 @@ from __future__ import annotations
 import os
 import re
 import sys
+from functools import cache
 from pathlib import Path
 
-__all__ = ["choose_kernels", "kernels"]
+__all__ = ["abilities", "choose_kernels", "kernels"]
 
 CHOICE = "OPENBLAS_CORETYPE"
 """What tells OpenBLAS, read once when it is loaded."""
@@ -31,12 +32,31 @@ def kernels(cpuinfo: str) -> str | None:
     Args:
         cpuinfo: what Linux says of the processor, /proc/cpuinfo.
     """
+    vendor, flags = _told(cpuinfo)
+    if vendor != "GenuineIntel":
+        return None
+    return next((name for name, needed in NEEDED.items() if needed <= flags), None)
+
+
+def _told(cpuinfo: str) -> tuple[str, set[str]]:
+    """Maker and abilities of the first processor that Linux tells of."""
     first = cpuinfo.split("\n\n")[0]
     found = dict(re.findall(r"^(vendor_id|flags)\s*: (.*)$", first, re.M))
-    if found.get("vendor_id") != "GenuineIntel":
-        return None
-    flags = set(found.get("flags", "").split())
-    return next((name for name, needed in NEEDED.items() if needed <= flags), None)
+    return found.get("vendor_id", ""), set(found.get("flags", "").split())
+
+
+def _cpuinfo() -> str:
+    try:
+        with Path("/proc/cpuinfo").open() as file:
+            return file.read(1 << 14)
+    except OSError:
+        return ""
+
+
+@cache
+def abilities() -> frozenset[str]:
+    """What this processor can do, in Linux's words; nothing where Linux does not say."""
+    return frozenset(_told(_cpuinfo())[1])
 
 
 def choose_kernels() -> None:
@@ -47,10 +67,6 @@ def choose_kernels() -> None:
     """
     if "numpy" in sys.modules:
         return
-    try:
-        with Path("/proc/cpuinfo").open() as file:
-            found = kernels(file.read(1 << 14))
-    except OSError:
-        return
+    found = kernels(_cpuinfo())
     if found is not None:
         os.environ.setdefault(CHOICE, found)

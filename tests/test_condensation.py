@@ -47,6 +47,8 @@ class Blocks:
         added: to the diagonal block of nodes, by their number.
     """
 
+    in_blocks = False
+
     def __init__(self, net, *, symmetric, added=(), comm=MPI.COMM_WORLD):
         ones = np.ones(len(net.cells))[:, None]
         stiffness, mass = ones * SECTION.stiffness(), ones * SECTION.mass()

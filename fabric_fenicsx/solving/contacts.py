@@ -170,7 +170,7 @@ class Contacts:
 
         together = gaps[0] if len(gaps) == 1 else as_vector(gaps)
         form = beam.node_sums(tows, together, _dolfinx.lagrange(tows.mesh, len(gaps)))
-        self._gaps = _dolfinx.compile_form(form, disc.comm)
+        self._gaps = disc.compiled(form, often=True)
 
     def refresh(self) -> None:
         """Bring everything up to date that depends on the increment otherwise than by UFL."""

@@ -29,6 +29,10 @@ from .update import advance
 
 __all__ = ["BLOCK", "Discretisation"]
 
+#: Cells of a net from which on kernels are compiled for several cells at a time as well, which
+#: takes up to some seconds for each, once: those of each iteration, and those of each step.
+MANY_OFTEN, MANY = 1000, 4000
+
 #: PETSc's own copy of each communicator that nets are on, by its handle.
 _COPIES: dict[int, PETSc.Comm] = {}
 
@@ -184,6 +188,16 @@ class Discretisation:
             offset=self.crossing_field(vectors, offset) if offset.any() else None,
         )
 
+    def compiled(self, form: Any | None, *, often: bool = False) -> Any:
+        """Compile a form; a rank without cells for it has None. Collective.
+
+        Args:
+            form: the UFL form.
+            often: whether it is evaluated in each iteration, and not only once a step.
+        """
+        wide = len(self.net.cells) >= (MANY_OFTEN if often else MANY)
+        return _dolfinx.compile_form(form, self.comm, here=form is not None, wide=wide)
+
     def nodal_directions(self) -> dict[str, Array]:
         """Unit "tangent" of the tow and unit "normal" of the sheet at every node of the net."""
         net = self.net
@@ -288,10 +302,16 @@ class Discretisation:
     @cached_property
     def own_pairs(self) -> npt.NDArray[np.int64]:
         """Both ends of this rank's cells and connectors as places in ``own_blocks``, (n, 2)."""
-        pairs = [_dolfinx.cell_dofs(self.tows.space)[: len(self.owned_cells)]]
+        return np.vstack(list(self.pairs_by_mesh.values()))
+
+    @property
+    def pairs_by_mesh(self) -> dict[str, npt.NDArray[np.int64]]:
+        """The same of each mesh, in the order of its cells."""
+        pairs = {"tows": _dolfinx.cell_dofs(self.tows.space)[: len(self.owned_cells)]}
         if self.connectors is not None:
-            pairs.append(self.own_vertices[_dolfinx.cell_dofs(self.connectors.space)])
-        return np.vstack(pairs)
+            connectors = _dolfinx.cell_dofs(self.connectors.space)
+            pairs["crossovers"] = self.own_vertices[connectors]
+        return pairs
 
     def vector(self) -> PETSc.Vec:
         """A zero vector of the unknowns."""

@@ -56,12 +56,7 @@ class Histories:
                 form = beam.node_sums(disc.tows, expression, space)
             elif disc.connectors is not None:
                 form = crossover.crossing_values(disc.connectors, expression, space)
-        here = field is not None
-        self._entries[name] = (
-            where,
-            field,
-            _dolfinx.compile_form(form, disc.comm, here=here),
-        )
+        self._entries[name] = where, field, disc.compiled(form)
 
     def add_numbers(self, name: str, values: Array) -> None:
         """Keep numbers in the step files that whoever hands them over changes in place himself.

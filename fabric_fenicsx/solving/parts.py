@@ -144,12 +144,10 @@ class Crossings:
             histories.add(name, "crossings", field, expression)
 
     def _compiled(self, expression: Any) -> Any:
-        fields, comm = self.disc.connectors, self.disc.comm
+        fields = self.disc.connectors
         if fields is None:
-            return _dolfinx.compile_form(None, comm, here=False)
-        return _dolfinx.compile_form(
-            crossover.crossing_values(fields, expression, self._space), comm
-        )
+            return self.disc.compiled(None)
+        return self.disc.compiled(crossover.crossing_values(fields, expression, self._space))
 
     def set_step(self, length: float, last: float = 0.0) -> None:
         """How laws take rates in the step to come, see ``backward_difference``.

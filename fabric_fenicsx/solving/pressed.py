@@ -70,16 +70,17 @@ class PressedTool:
     ) -> None:
         self._disc, self._force = disc, force
         self._place, self._shift, self._moved, self._reach = place, shift, moved, reach
-        tows, comm = disc.tows, disc.comm
+        tows = disc.tows
         up = as_vector((0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
         residual, lift = _work(tows, energy, traction, tows.test), _work(tows, energy, traction, up)
         row = derivative(lift, tows.w, tows.test)
         self._pairs = _dolfinx.constants_per_cell(tows.mesh, 2)
         state = side_by_side([lift, derivative(lift, tows.w, up)], self._pairs)
-        self._lift = _dolfinx.compile_form(state, comm)
-        self._row = self._column = _dolfinx.compile_form(row, comm)
+        self._lift = disc.compiled(state, often=True)
+        self._row = self._column = disc.compiled(row, often=True)
         if traction is not None:
-            self._column = _dolfinx.compile_form(derivative(residual, tows.w, up), comm)
+            column = derivative(residual, tows.w, up)
+            self._column = disc.compiled(column, often=True)
         self.target = 0.0
         self.height_n = np.array([float(place.value[2])])
 

@@ -66,8 +66,8 @@ class System:
         self._symmetric = all(net.comm.allgather(all(term.symmetric for term in with_tangent)))
         tows = net.tows
         self._dw = Function(tows.space)
-        self._forces = _dolfinx.compile_form(
-            linearised_forces(tows, self._dw, net.forces_space, law), net.comm
+        self._forces = net.compiled(
+            linearised_forces(tows, self._dw, net.forces_space, law), often=True
         )
         self.nodal_loads = np.zeros((len(net.local_nodes), BLOCK))
         self.gyroscopic = False
@@ -89,14 +89,14 @@ class System:
         """The compiled sum of one part of all terms on a mesh; None without any. Collective."""
         parts = [getattr(term, part) for term in self.terms if term.where == mesh]
         forms = [form for form in parts if form is not None]
-        return self._compile(sum(forms[1:], start=forms[0]) if forms else None)
+        return self._compile(sum(forms[1:], start=forms[0]) if forms else None, often=True)
 
-    def _compile(self, form: Any | None) -> Any:
+    def _compile(self, form: Any | None, *, often: bool = False) -> Any:
         """Compile a form; a rank without cells for it has None. Collective."""
         comm = self.net.comm
         if not any(comm.allgather(form is not None)):
             return None
-        return _dolfinx.compile_form(form, comm, here=form is not None)
+        return self.net.compiled(form, often=often)
 
     @property
     def symmetric(self) -> bool:
@@ -178,6 +178,30 @@ class System:
         if self.net.connectors is not None:
             _dolfinx.add_matrix(A, self._tangents["crossovers"])
         A.assemble()
+        self.assemble_seconds += perf_counter() - start
+
+    @property
+    def in_blocks(self) -> bool:
+        """Whether this rank can have the tangent by ``tangent_blocks``, which knows no moments."""
+        moments = self.nodal_loads[: self.net.owned, 3:].any()
+        return not moments and all(
+            form is None or _dolfinx.has_blocks(form) for form in self._tangents.values()
+        )
+
+    def tangent_blocks(self, blocks: Array, places: dict[str, npt.NDArray[np.int32]]) -> None:
+        """Assemble the tangent into the blocks of a matrix, each stored by columns.
+
+        Args:
+            blocks: where to, (n_blocks, 6, 6).
+            places: for each mesh, which of them each pair of a cell's nodes has; -1 for those that
+                are not stored, (n_cells, 2, 2).
+        """
+        start = perf_counter()
+        self.assemblies["tangent"] += 1
+        blocks[:] = 0.0
+        for mesh, form in self._tangents.items():
+            if form is not None:
+                _dolfinx.add_blocks(blocks, form, places[mesh])
         self.assemble_seconds += perf_counter() - start
 
     def load_work(self) -> Array:

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from .. import _dolfinx
 from .blocks import BLOCK, expand
-from .condensation import Elimination, Runs, inner_nodes
+from .condensation import Blocks, Elimination, Runs, inner_nodes
 from .direct import destroy, ordering, petsc, solved, solver
 from .discretisation import Discretisation
 from .remainder import ByFronts, ByMumps, Left
@@ -155,6 +155,7 @@ class Condensed:
         self._held = free.array_r == 0.0
         # A matrix has its pattern once it has been filled.
         system.tangent(self._A)
+        self._places = _places(net, self._A, symmetric)
         self.refused: npt.NDArray[np.bool_] = np.zeros(len(net.net.points), dtype=bool)
         self._since = 0
         self._number()
@@ -180,12 +181,10 @@ class Condensed:
         self._runs = runs.only(owner[runs.ends[:, 0]] == disc.comm.rank)
         place = np.full(len(net.points), -1)
         place[here] = np.arange(len(here))
-        starts, columns = self._A.getRowIJ(False, True)
-        rows = np.repeat(np.arange(len(here)), np.diff(starts))
         self._elimination = Elimination(
             self._functions,
             self._runs.renamed(place),
-            (rows, columns.astype(np.int64)),
+            _pattern(self._A),
             number[here],
             self._symmetric,
         )
@@ -221,7 +220,11 @@ class Condensed:
 
     def assemble(self) -> None:
         """Assemble the tangent at the increment and section forces set last. Collective."""
-        self._system.tangent(self._A)
+        if self._system.in_blocks:
+            blocks = _stored_blocks(self._A).reshape(-1, BLOCK, BLOCK)
+            self._system.tangent_blocks(blocks, self._places)
+        else:
+            self._system.tangent(self._A)
         self.matrix.stateIncrease()
 
     def mult(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -280,6 +283,25 @@ def _owners(disc: Discretisation) -> npt.NDArray[np.int64]:
     """Rank that owns each node of the net, on every rank. Collective."""
     last = np.cumsum(disc.comm.allgather(disc.owned))
     return np.searchsorted(last, disc.node_block, side="right")
+
+
+def _pattern(A: PETSc.Mat) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Rows and columns of the blocks of a matrix on one rank, as they are stored."""
+    starts, columns = A.getRowIJ(False, True)
+    rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    return rows, columns.astype(np.int64)
+
+
+def _places(net: Discretisation, A: PETSc.Mat, symmetric: bool) -> dict[str, npt.NDArray[np.int32]]:
+    """Where the blocks of each cell and connector are stored, (n, 2, 2); -1: nowhere."""
+    stored = Blocks(*_pattern(A), symmetric)
+    places = {}
+    for mesh, pairs in net.pairs_by_mesh.items():
+        at = stored.places(np.repeat(pairs, 2, axis=1), np.tile(pairs, 2))
+        # The other half of a symmetric matrix.
+        found = np.where(at % 2, -1, at // 2)
+        places[mesh] = found.reshape(-1, 2, 2).astype(np.int32)
+    return places
 
 
 def _stored_blocks(A: PETSc.Mat) -> npt.NDArray[np.float64]:

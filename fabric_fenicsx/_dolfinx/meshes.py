@@ -1,0 +1,188 @@
+"""Meshes of two-node intervals, fields on them, and the numbering maps."""
+
+from __future__ import annotations
+
+import inspect
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from time import perf_counter
+from typing import Any
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import basix
+import dolfinx
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import GhostMode, create_mesh
+
+_BASIX_UFL = hasattr(ufl, "__version__") and not hasattr(ufl, "FiniteElement")
+
+# Seconds that this process has spent in the form compiler, for the run's report.
+compile_seconds: list[float] = [0.0]
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Count the seconds, and keep the C compiler's command lines off the terminal."""
+    start = perf_counter()
+    logging.disable(logging.INFO)
+    try:
+        yield
+    finally:
+        logging.disable(logging.NOTSET)
+        compile_seconds[0] += perf_counter() - start
+
+
+def interval_mesh(
+    comm: MPI.Comm,
+    points: npt.NDArray[np.float64],
+    cells: npt.NDArray[np.int64],
+    owners: npt.NDArray[np.int64] | None = None,
+) -> Any:
+    """A mesh of two-node intervals, every one of them given on rank 0.
+
+    Args:
+        comm: the communicator to distribute it on.
+        points: node positions, shape (n_nodes, gdim); read on rank 0 only.
+        cells: node numbers, shape (n_cells, 2); read on rank 0 only.
+        owners: rank of each cell, shape (n_cells,); read on rank 0 only. By default rank 0.
+
+    Returns:
+        The dolfinx mesh. Facets that two ranks share are ghosted, or an interior node would
+        look like a tow end.
+    """
+    gdim = points.shape[1]
+    if comm.rank != 0:
+        points = np.zeros((0, gdim))
+        cells = np.zeros((0, 2), dtype=np.int64)
+    if owners is None or comm.rank != 0:
+        owners = np.zeros(len(cells), dtype=np.int64)
+    # Of whichever arguments this version hands over: each rank's cells are those above.
+    destinations = _with_ghosts(cells, owners)
+
+    def partitioner(*_: Any) -> Any:
+        return dolfinx.cpp.graph.AdjacencyList_int32(*destinations)
+
+    cells = np.ascontiguousarray(cells, dtype=np.int64)
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    if _BASIX_UFL:
+        element = basix.ufl.element("Lagrange", "interval", 1, shape=(gdim,))
+        arguments = list(inspect.signature(create_mesh).parameters)
+        if arguments.index("x") < arguments.index("e" if "e" in arguments else "domain"):
+            return create_mesh(comm, cells, points, element, partitioner=partitioner)
+        return create_mesh(comm, cells, element, points, partitioner=partitioner)
+    # "equispaced": with any other variant the ranks disagree about the form's signature.
+    element = ufl.VectorElement(
+        "Lagrange", ufl.Cell("interval", geometric_dimension=gdim), 1, dim=gdim,
+        variant="equispaced",
+    )  # fmt: skip
+    return create_mesh(
+        comm,
+        cells,
+        points,
+        ufl.Mesh(element),
+        ghost_mode=GhostMode.shared_facet,
+        partitioner=partitioner,
+    )
+
+
+def _with_ghosts(
+    cells: npt.NDArray[np.int64], owners: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+    """Ranks that need each cell, its owner first, and where those of each cell begin.
+
+    A rank needs its own cells and those that share a node with them.
+    """
+    count = len(cells)
+    order = np.argsort(cells.ravel(), kind="stable")
+    nodes, cell = cells.ravel()[order], order // 2
+    meet = np.flatnonzero(nodes[1:] == nodes[:-1])
+    at = np.concatenate([cell[meet], cell[meet + 1]])
+    needing = owners[np.concatenate([cell[meet + 1], cell[meet]])]
+    foreign = needing != owners[at]
+    ghosts = np.unique(np.column_stack([at[foreign], needing[foreign]]), axis=0)
+    at = np.concatenate([np.arange(count), ghosts[:, 0]])
+    ranks = np.concatenate([owners, ghosts[:, 1]])[np.argsort(at, kind="stable")]
+    begins = np.concatenate([[0], np.cumsum(np.bincount(at, minlength=count))])
+    return ranks.astype(np.int32), begins.astype(np.int32)
+
+
+def _space(mesh: Any, family: str, degree: int, size: int) -> Any:
+    with compiling():
+        if hasattr(fem, "functionspace"):
+            element = (family, degree, (size,)) if size > 1 else (family, degree)
+            return fem.functionspace(mesh, element)
+        if size > 1:
+            return fem.VectorFunctionSpace(mesh, (family, degree), dim=size)
+        return fem.FunctionSpace(mesh, (family, degree))
+
+
+def lagrange(mesh: Any, size: int) -> Any:
+    """Continuous piecewise linear fields with ``size`` components, blocked by node."""
+    return _space(mesh, "Lagrange", 1, size)
+
+
+def constants_per_cell(mesh: Any, size: int) -> Any:
+    """Fields with ``size`` components that are constant in each cell."""
+    return _space(mesh, "DG", 0, size)
+
+
+def constant(mesh: Any, value: Any) -> Any:
+    """A number or vector that forms on ``mesh`` read when assembled, from its ``.value``.
+
+    One that is such a constant already stays what it is.
+    """
+    if isinstance(value, fem.Constant):
+        return value
+    return fem.Constant(
+        mesh,
+        PETSc.ScalarType(value)
+        if np.isscalar(value)
+        else np.asarray(value, dtype=PETSc.ScalarType),
+    )
+
+
+def nodes_of_cells(mesh: Any) -> Any:
+    """The mesh's table of each cell's nodes."""
+    tables = getattr(mesh.geometry, "dofmaps", None)
+    return tables[0] if isinstance(tables, (list, tuple)) else mesh.geometry.dofmap
+
+
+def rows_of_cells(mesh: Any, table: Any) -> npt.NDArray[np.int32]:
+    """A table with a row for each local cell, without a copy."""
+    table = table() if callable(table) else table
+    array = np.asarray(table.array if hasattr(table, "array") else table)
+    return array.reshape(local_cells(mesh), -1)
+
+
+def cell_dofs(space: Any) -> npt.NDArray[np.int64]:
+    """Local block number of each cell's dofs, shape (n_local_cells, dofs_per_cell)."""
+    table = space.dofmap.list
+    array = table.array if hasattr(table, "array") else table
+    # A rank without cells has an empty table, which does not say how wide it is.
+    width = space.dofmap.dof_layout.num_dofs
+    return np.asarray(array, dtype=np.int64).reshape(local_cells(space.mesh), width)
+
+
+def local_cells(mesh: Any) -> int:
+    """Number of this rank's cells, ghosts included."""
+    cells = mesh.topology.index_map(mesh.topology.dim)
+    return int(cells.size_local + cells.num_ghosts)
+
+
+def input_nodes(mesh: Any) -> npt.NDArray[np.int64]:
+    """Node numbers, as given to interval_mesh, of each local cell, shape (n_local_cells, 2)."""
+    local = rows_of_cells(mesh, nodes_of_cells(mesh)).astype(np.int64)
+    return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[local]
+
+
+def input_cells(mesh: Any) -> npt.NDArray[np.int64]:
+    """Cell number, as given to interval_mesh, of each local cell, shape (n_local_cells,)."""
+    topology = mesh.topology
+    original = topology.original_cell_index
+    return np.asarray(original, dtype=np.int64)[: local_cells(mesh)]
