@@ -188,12 +188,21 @@ def test_without_fronts_it_is_mumps():
     by_fronts, other = both(system)
     np.testing.assert_allclose(found[0], other[0], rtol=0, atol=1e-11 * np.abs(other[0]).max())
     assert isinstance(by_mumps._solver, ByMumps)
-    by_fronts._by_fronts._fronts.factorise = lambda *matrix: False
+    fronts = by_fronts._by_fronts._fronts
+    fronts.factorise = lambda *matrix: False
     by_fronts.factorise()
     assert isinstance(by_fronts._solver, ByMumps)
-    del by_fronts._by_fronts._fronts.factorise
+    beside = []
+
+    def again(*matrix):
+        beside.append(by_fronts._by_mumps)
+        return type(fronts).factorise(fronts, *matrix)
+
+    fronts.factorise = again
     by_fronts.factorise()
-    assert by_fronts._by_mumps is None
+    # Both factors would not lie side by side.
+    assert beside == [None]
+    assert isinstance(by_fronts._solver, ByFronts)
 
 
 @pytest.mark.mpi

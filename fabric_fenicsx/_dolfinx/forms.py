@@ -19,7 +19,7 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
-from .lanes import COMPILER, Lanes
+from .lanes import COMPILER, Lanes, wide_options
 from .meshes import compiling, local_cells
 from .native import built
 from .wide import dofs_of_cells, in_lanes
@@ -134,7 +134,7 @@ def compile_source(path: Path, comm: MPI.Comm) -> Any | None:
 def _compiled_source(path: Path) -> Any | None:
     """The module of a C file, from the cache or compiled into it; None where that fails."""
     source = path.read_text()
-    return built(path.stem, lambda: source, _cache(), key=source, options=_SOURCE_FLAGS)
+    return built(path.stem, lambda: source, _cache(), key=source, options=[*_SOURCE_FLAGS, *wide_options()])
 
 
 def _cache() -> Path:

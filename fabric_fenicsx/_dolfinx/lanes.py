@@ -22,7 +22,7 @@ import numpy.typing as npt
 from ..processor import abilities
 from .native import built
 
-__all__ = ["Coefficient", "Lanes", "compiled", "wide_source"]
+__all__ = ["Coefficient", "Lanes", "compiled", "wide_options", "wide_source"]
 
 #: The parts of -ffast-math that speed straight-line code up; the rest would change how the whole
 #: process rounds, or take infinities for granted to be absent.
@@ -183,5 +183,10 @@ def compiled(name: str, source: Callable[[], str], folder: Path) -> Any | None:
         source: gives what to compile, see ``wide_source``.
         folder: of compiled modules.
     """
-    options = [*COMPILER, *(WIDE.values() if set(WIDE) <= abilities() else ())]
+    options = [*COMPILER, *wide_options()]
     return built(f"wide_{name}", source, folder, key=_frame(), options=options, extension=".cpp")
+
+
+def wide_options() -> list[str]:
+    """What tells a compiler of this processor's wide vectors."""
+    return list(WIDE.values()) if set(WIDE) <= abilities() else []

@@ -251,12 +251,14 @@ class Condensed:
             self._renumber()
         blocks = self._elimination.left
         self._solver: ByFronts | ByMumps
-        if self._by_fronts is not None and self._by_fronts.factorise(blocks):
+        if self._by_fronts is not None:
             if self._by_mumps is not None:
+                # First, or both factors would lie side by side.
                 self._by_mumps.destroy()
                 self._by_mumps = None
-            self._solver = self._by_fronts
-            return
+            if self._by_fronts.factorise(blocks):
+                self._solver = self._by_fronts
+                return
         if self._by_mumps is None:
             self._by_mumps = ByMumps(self._left, self._prefix + "condensed_")
         self._by_mumps.factorise(blocks)
