@@ -1,5 +1,7 @@
 """Kernels for several cells at a time: against those of dolfinx for one."""
 
+import logging
+
 from mpi4py import MPI
 
 import numpy as np
@@ -9,7 +11,7 @@ from on_ranks import small_model
 from test_rigs import SMALL, session
 
 from fabric_fenicsx import _dolfinx
-from fabric_fenicsx._dolfinx import lanes
+from fabric_fenicsx._dolfinx import forms, lanes
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.solving import discretisation
@@ -102,10 +104,13 @@ def test_a_source_of_another_kind_is_refused():
         lanes.wide_source("void wanted(double* A)\n{\na ? b\n}\n", "wanted", [], [(2, 6)])
 
 
-def test_without_a_compiler_for_cpp_kernels_take_one_cell(monkeypatch):
+def test_without_a_compiler_for_cpp_kernels_take_one_cell(monkeypatch, caplog):
     mesh, space, fields = chain(3)
     monkeypatch.setattr(lanes, "built", lambda *_, **__: None)
-    compiled = _dolfinx.compile_form(integrands(mesh, space, fields), MPI.COMM_SELF, wide=True)
+    forms._say_once.cache_clear()
+    with caplog.at_level(logging.WARNING):
+        compiled = _dolfinx.compile_form(integrands(mesh, space, fields), MPI.COMM_SELF, wide=True)
+    assert ["one cell" in record.message for record in caplog.records] == [True]
     values = np.zeros(len(fields[0].x.array))
     _dolfinx.add_vector(values, compiled)
     assert all(part.lanes is None for part in compiled)

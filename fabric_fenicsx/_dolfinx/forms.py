@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import logging
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -89,7 +90,15 @@ def compile_form(form: ufl.Form, comm: MPI.Comm, *, here: bool = True, wide: boo
     def widened() -> list[_Part]:
         if not wide:
             return [_Part(form) for form in forms]
-        return [_Part(form, in_lanes(form, _cache()), dofs_of_cells(form)) for form in forms]
+        lanes = [in_lanes(form, _cache()) for form in forms]
+        if None in lanes and comm.rank == 0:
+            _say_once(
+                "no compiler for C++, or C of an unknown kind: kernels take one cell at a time"
+            )
+        return [
+            _Part(form, one, None if one is None else dofs_of_cells(form))
+            for form, one in zip(forms, lanes, strict=True)
+        ]
 
     forms: list[Any] = []
     parts = None
@@ -106,6 +115,11 @@ def compile_form(form: ufl.Form, comm: MPI.Comm, *, here: bool = True, wide: boo
                 parts = widened()
             comm.barrier()
     return parts
+
+
+@cache
+def _say_once(words: str) -> None:
+    logging.getLogger("fabric_fenicsx").warning(words)
 
 
 def compile_source(path: Path, comm: MPI.Comm) -> Any | None:
@@ -134,7 +148,9 @@ def compile_source(path: Path, comm: MPI.Comm) -> Any | None:
 def _compiled_source(path: Path) -> Any | None:
     """The module of a C file, from the cache or compiled into it; None where that fails."""
     source = path.read_text()
-    return built(path.stem, lambda: source, _cache(), key=source, options=[*_SOURCE_FLAGS, *wide_options()])
+    return built(
+        path.stem, lambda: source, _cache(), key=source, options=[*_SOURCE_FLAGS, *wide_options()]
+    )
 
 
 def _cache() -> Path:

@@ -34,12 +34,17 @@ def in_lanes(form: Any, folder: Path) -> Lanes | None:
         form: of dolfinx.
         folder: of compiled modules.
     """
-    symbol = _kernel(form)
+    inner = getattr(form, "_cpp_object", form)
+    try:
+        symbol = _kernel(form)
+        fields = [(f.x.array, *_table(f.function_space)) for f in inner.coefficients]
+    except AttributeError:
+        # A release that has them elsewhere.
+        return None
     if symbol is None:
         return None
     library, name = symbol
-    inner = getattr(form, "_cpp_object", form)
-    coefficients = [Coefficient(f.x.array, *_table(f.function_space)) for f in inner.coefficients]
+    coefficients = [Coefficient(*field) for field in fields]
     rows = [_table(space) for space in inner.function_spaces]
 
     def source() -> str:
@@ -79,4 +84,6 @@ def dofs_of_cells(form: Any) -> npt.NDArray[np.int32]:
 
 def _table(space: Any) -> tuple[npt.NDArray[np.int32], int]:
     """Dofs of each cell as dolfinx stores them, and numbers of each."""
-    return rows_of_cells(space.mesh, space.dofmap.list), int(space.dofmap.index_map_bs)
+    dofmap = space.dofmap
+    table = dofmap.list if hasattr(dofmap, "list") else dofmap.map
+    return rows_of_cells(space.mesh, table), int(dofmap.index_map_bs)
