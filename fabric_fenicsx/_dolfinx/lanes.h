@@ -39,14 +39,15 @@ INLINE V select(bool which, V a, V b) { return which ? a : b; }
 INLINE V fmax(V a, V b) { return a.r > b.r ? a.r : b.r; }
 INLINE V fmin(V a, V b) { return a.r < b.r ? a.r : b.r; }
 
-#define BY_LANES(f) INLINE V f(V a) { V b; EACH b.r[l] = __builtin_##f(a.r[l]); return b; }
+/* In a vector of its own: a lane of a V that is written to keeps it, and what follows, in memory. */
+#define BY_LANES(f) INLINE V f(V a) { Numbers b; EACH b[l] = __builtin_##f(a.r[l]); return b; }
 BY_LANES(sqrt) BY_LANES(fabs)
 BY_LANES(exp) BY_LANES(log)
 BY_LANES(sin) BY_LANES(cos) BY_LANES(tan) BY_LANES(asin) BY_LANES(acos) BY_LANES(atan)
 BY_LANES(sinh) BY_LANES(cosh) BY_LANES(tanh) BY_LANES(erf)
 
-INLINE V atan2(V a, V b) { V c; EACH c.r[l] = __builtin_atan2(a.r[l], b.r[l]); return c; }
-INLINE V pow(V a, V b) { V c; EACH c.r[l] = __builtin_pow(a.r[l], b.r[l]); return c; }
+INLINE V atan2(V a, V b) { Numbers c; EACH c[l] = __builtin_atan2(a.r[l], b.r[l]); return c; }
+INLINE V pow(V a, V b) { Numbers c; EACH c[l] = __builtin_pow(a.r[l], b.r[l]); return c; }
 INLINE V pow(V a, int n)
 {
   V b = 1.0;
@@ -89,7 +90,8 @@ INLINE void scatter_blocks(const V *A, int l, const int32_t *place, double *bloc
     }
 }
 
-static void kernel(V *A, const V *w, const double *c, const V *coordinate_dofs)
+static void kernel(V *__restrict A, const V *__restrict w, const double *__restrict c,
+                   const V *__restrict coordinate_dofs)
 {
   KERNEL
 }
