@@ -12,7 +12,9 @@ import numpy as np
 from solve import GivenSection, Statics, plain_net, set_loads, set_state
 
 from fabric_fenicsx.fabric.chains import net_from_lines
+from fabric_fenicsx.solving import discretisation
 from fabric_fenicsx.solving.model import CrossoverLaw, Model, Support
+from fabric_fenicsx.solving.remainder import ByFronts
 
 SECTION = GivenSection((400.0, 150.0, 150.0, 60.0, 50.0, 90.0))
 LAW = CrossoverLaw(translation=40.0, k1=5.0, k3=2.0, dashpot=3.0, alignment=8.0)
@@ -75,11 +77,38 @@ def cross_of_two_cells(comm):
     return statics.displacements
 
 
+def by_fronts(comm):
+    """A larger net under its corners' forces: condensed, factorised by fronts, kernels by lanes.
+
+    Returns:
+        Displacements, iterations, what factorised and unknowns of the ranks' edges.
+    """
+    discretisation.MANY_OFTEN = 1
+    net = plain_net(8, 8, 4.0, 2)
+    feet = net.ends[net.tow_family == 0, 0]
+    supports = [Support(feet, (0, 1, 2, 3, 4, 5))]
+    model = Model(net, SECTION, crossovers=LAW, supports=supports, comm=comm)
+    assert model.system.in_blocks
+    statics = Statics(model, force_tolerance=1e-10)
+    top = model.net.ends[model.net.tow_family == 0, 1]
+
+    def load(part):
+        for node, force in ((top[0], [0.02, 0.0, 0.05]), (top[-1], [0.03, 0.02, -0.06])):
+            set_loads(model, node, part * np.array([*force, 0.0, 0.0, 0.0]))
+
+    statics.run(3, load)
+    newton = statics.stepper.newton
+    solver = newton._tangents[True]._solver
+    edge = len(solver._dense) if isinstance(solver, ByFronts) else None
+    return statics.displacements, newton.iterations, type(solver).__name__, edge
+
+
 if __name__ == "__main__":
     world = MPI.COMM_WORLD
     norm, residual = tangent_norm(world)
     displacements, gamma = solved(world)
     cross = cross_of_two_cells(world)
+    fronts, iterations, solver, edge = by_fronts(world)
     if world.rank == 0:
         found = {
             "ranks": world.size,
@@ -88,5 +117,9 @@ if __name__ == "__main__":
             "displacements": displacements.tolist(),
             "gamma": gamma.tolist(),
             "cross": cross.tolist(),
+            "fronts": fronts.tolist(),
+            "iterations": iterations,
+            "solver": solver,
+            "edge": edge,
         }
         print(json.dumps(found))

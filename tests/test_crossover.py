@@ -253,10 +253,14 @@ def on_that_many(ranks):
 
 
 @pytest.mark.skipif(not MPIRUN.exists(), reason="needs /usr/bin/mpirun")
-def test_one_two_and_three_ranks_find_the_same():
-    found = [on_that_many(ranks) for ranks in (1, 2, 3)]
+def test_up_to_four_ranks_find_the_same():
+    found = [on_that_many(ranks) for ranks in (1, 2, 3, 4)]
     one = found[0]
-    assert [f["ranks"] for f in found] == [1, 2, 3]
+    assert [f["ranks"] for f in found] == [1, 2, 3, 4]
+    # By fronts on all of them, with nodes on the ranks' edges.
+    assert [f["solver"] for f in found] == ["ByFronts"] * 4
+    assert one["edge"] == 0
+    assert min(f["edge"] for f in found[1:]) > 0
     for other in found[1:]:
         # Sums in another order: round-off of some hundred terms.
         assert other["tangent"] == pytest.approx(one["tangent"], rel=1e-12)
@@ -266,5 +270,8 @@ def test_one_two_and_three_ranks_find_the_same():
         np.testing.assert_allclose(other["gamma"], one["gamma"], atol=1e-9)
         # Two cells: on three ranks one has nothing.
         np.testing.assert_allclose(other["cross"], one["cross"], atol=1e-8)
+        np.testing.assert_allclose(other["fronts"], one["fronts"], atol=1e-8)
+        assert other["iterations"] == one["iterations"]
     assert np.abs(one["cross"]).max() > 0.1
     assert np.abs(one["displacements"]).max() > 1.0
+    assert np.abs(one["fronts"]).max() > 1.0

@@ -153,20 +153,21 @@ def nodes_of_cells(mesh: Any) -> Any:
     return tables[0] if isinstance(tables, (list, tuple)) else mesh.geometry.dofmap
 
 
-def rows_of_cells(mesh: Any, table: Any) -> npt.NDArray[np.int32]:
-    """A table with a row for each local cell, without a copy."""
+def rows_of_cells(mesh: Any, table: Any, width: int) -> npt.NDArray[np.int32]:
+    """A table with a row for each local cell, without a copy.
+
+    A rank without cells has an empty one, which does not say how wide it is.
+    """
     table = table() if callable(table) else table
     array = np.asarray(table.array if hasattr(table, "array") else table)
-    return array.reshape(local_cells(mesh), -1)
+    return array.reshape(local_cells(mesh), width)
 
 
 def cell_dofs(space: Any) -> npt.NDArray[np.int64]:
     """Local block number of each cell's dofs, shape (n_local_cells, dofs_per_cell)."""
-    table = space.dofmap.list
-    array = table.array if hasattr(table, "array") else table
-    # A rank without cells has an empty table, which does not say how wide it is.
-    width = space.dofmap.dof_layout.num_dofs
-    return np.asarray(array, dtype=np.int64).reshape(local_cells(space.mesh), width)
+    dofmap = space.dofmap
+    table = rows_of_cells(space.mesh, dofmap.list, dofmap.dof_layout.num_dofs)
+    return np.asarray(table, dtype=np.int64)
 
 
 def local_cells(mesh: Any) -> int:
@@ -177,7 +178,7 @@ def local_cells(mesh: Any) -> int:
 
 def input_nodes(mesh: Any) -> npt.NDArray[np.int64]:
     """Node numbers, as given to interval_mesh, of each local cell, shape (n_local_cells, 2)."""
-    local = rows_of_cells(mesh, nodes_of_cells(mesh)).astype(np.int64)
+    local = rows_of_cells(mesh, nodes_of_cells(mesh), 2).astype(np.int64)
     return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[local]
 
 

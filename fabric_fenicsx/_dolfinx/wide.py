@@ -60,7 +60,7 @@ def in_lanes(form: Any, folder: Path) -> Lanes | None:
     if functions is None:
         return None
     mesh = inner.mesh
-    places = Coefficient(mesh.geometry.x, rows_of_cells(mesh, nodes_of_cells(mesh)), 3)
+    places = Coefficient(mesh.geometry.x, rows_of_cells(mesh, nodes_of_cells(mesh), 2), 3)
     cells = int(mesh.topology.index_map(mesh.topology.dim).size_local)
     return Lanes(functions, cells, places, coefficients)
 
@@ -86,4 +86,5 @@ def _table(space: Any) -> tuple[npt.NDArray[np.int32], int]:
     """Dofs of each cell as dolfinx stores them, and numbers of each."""
     dofmap = space.dofmap
     table = dofmap.list if hasattr(dofmap, "list") else dofmap.map
-    return rows_of_cells(space.mesh, table), int(dofmap.index_map_bs)
+    width = dofmap.dof_layout.num_dofs
+    return rows_of_cells(space.mesh, table, width), int(dofmap.index_map_bs)
