@@ -102,6 +102,14 @@ def fit_combinations(
             if not found.converged:
                 found = _again(experiment, found, found.values, evaluations, robust)
             fits[k] = _around_jumps(experiment, found, evaluations, robust)
+    sizes = [f.size(robust) for f in fits]
+    for k, size in enumerate(sizes):
+        # From a better value the rest of the model leads to a better one yet.
+        while size <= CRITERIA.second_start * min(sizes):
+            fits[k] = _around_jumps(experiment, fits[k], evaluations, robust)
+            gain, size = size - fits[k].size(robust), fits[k].size(robust)
+            if gain < CRITERIA.decisive:
+                break
     return fits
 
 
