@@ -131,7 +131,7 @@ class Whiteness:
 
 
 def steps_back(readings: Readings, rows: Flags) -> npt.NDArray[np.int_]:
-    """How many places before each of some readings the one before it is; 0 first in a line, (n,)."""
+    """Places from each of some readings to the one before it; 0 at the start of a line, (n,)."""
     at = np.flatnonzero(rows)
     same = readings.chain[at[1:]] == readings.chain[at[:-1]]
     back = np.zeros(len(at), dtype=int)
