@@ -53,6 +53,15 @@ def test_the_predictive_check_is_the_textbook_s():
     assert doubt == pytest.approx(scatter * np.array(expected), rel=1e-9)
 
 
+def test_a_prediction_as_if_a_parameter_were_known():
+    line, model = fitted(1)
+    out = line.readings.holdout
+    # The mean of 40 readings is known to 1/sqrt(40).
+    assert model.prediction_std(out, ["b"]) == pytest.approx(40**-0.5, rel=1e-9)
+    assert model.prediction_std(out, ["a", "b"]) == pytest.approx(0.0, abs=1e-9)
+    assert model.prediction_std(out, ["c"]) == model.prediction_std(out) > 0.3
+
+
 def test_an_extrapolated_line_is_no_surprise():
     raw, foreseen = [], []
     for seed in range(300):

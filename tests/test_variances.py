@@ -1,5 +1,7 @@
 """Variance components: against dense matrices, closed forms, and data of known components."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear import Linear, covariance, drawn, readings
@@ -9,7 +11,13 @@ from scipy.stats import multivariate_normal
 from fabric_fenicsx.loop.inference.criteria import CRITERIA
 from fabric_fenicsx.loop.inference.fitting import fit, linearised
 from fabric_fenicsx.loop.inference.noise import Noise
-from fabric_fenicsx.loop.inference.variances import Linearised, Variances, averaged, estimate
+from fabric_fenicsx.loop.inference.variances import (
+    Linearised,
+    Variances,
+    _Problem,
+    averaged,
+    estimate,
+)
 
 #: Of −2 log likelihood that the search leaves: nothing, to what is known of components.
 NEARLY = 0.1
@@ -73,9 +81,20 @@ def prior(noise, taus, at, usual, given):
     return found
 
 
-@pytest.mark.parametrize(("smooth", "given"), [(False, None), (True, None), (False, 0.5)])
-def test_the_likelihoods_are_those_of_dense_matrices(smooth, given):
+def uncertain(at, columns=3, size=0.2):
+    """The same with a model that errs itself, alike at readings near each other."""
+    t = np.linspace(0.0, 1.0, len(at.readings.observed))
+    error = size * np.sin(np.outer(t, np.pi * np.arange(1, columns + 1)))
+    return replace(at, readings=replace(at.readings, model_error=error))
+
+
+EXAMPLES = [(False, None, False), (True, None, False), (False, 0.5, False), (False, None, True)]
+
+
+@pytest.mark.parametrize(("smooth", "given", "errs"), EXAMPLES)
+def test_the_likelihoods_are_those_of_dense_matrices(smooth, given, errs):
     at, usual = example(), 0.3
+    at = uncertain(at) if errs else at
     found = estimate(at, START, given=given, smooth=smooth, usual_scatter=usual)
     S = smooth_lines(at, CRITERIA.readings_per_knot)
     noise, taus = found.variances.noise, [found.variances.scatter[g] for g in at.specimens]
@@ -95,6 +114,23 @@ def test_the_likelihoods_are_those_of_dense_matrices(smooth, given):
         near = Noise(noise.floor, noise.share, phi)
         other = dense(at, near, taus, found.smooth, S)[0] + prior(near, taus, at, usual, given)
         assert other > found.restricted - NEARLY
+
+
+@pytest.mark.parametrize("errs", [False, True])
+@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("of", [0, 1])
+def test_slopes_of_the_likelihoods_are_their_difference_quotients(of, smooth, errs):
+    at = uncertain(example()) if errs else example()
+    problem = _Problem(at, 0.5, smooth, 0.3)
+    problem.floor, problem.of = 0.37, of
+    inside = np.array([0.1, 0.4, 2.0, 3.0, 1.0, *[0.7] * smooth])
+    on_bounds = np.array([0.1, 0.0, 0.0, 0.0, 0.0, *[0.0] * smooth])
+    for x, back in ((inside, 1e-6), (on_bounds, 0.0)):
+        _, slope = problem.with_slope(x)
+        ways = np.eye(len(x))
+        low, high = ([problem.cost(x + h * e)[of] for e in ways] for h in (-back, 1e-6))
+        quotients = (np.array(high) - low) / (1e-6 + back)
+        assert slope == pytest.approx(quotients, rel=1e-4, abs=1e-3)
 
 
 def test_what_is_left_is_white_with_the_specimens_as_they_are():

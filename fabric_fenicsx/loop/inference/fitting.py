@@ -126,10 +126,13 @@ class Fit:
         allowed = float(np.sum((along.T @ r) ** 2 / (1.0 + 1.0 / np.maximum(size, 1e-150) ** 2)))
         return float(np.sqrt(max(float(r @ r) - allowed, 0.0) / len(r)))
 
-    def prediction_std(self, rows: Flags) -> float:
-        """Standard error of the expected readings there, root mean square."""
+    def prediction_std(self, rows: Flags, known: Sequence[str] = ()) -> float:
+        """Standard error of the expected readings there, root mean square.
+
+        As if some common parameters were known to be as found.
+        """
         weight = self.readings.weight[rows][:, None]
-        square = np.sum((weight * (self.slopes[rows] @ self.root)) ** 2, axis=1)
+        square = np.sum((weight * (self.slopes[rows] @ self._root_given(known))) ** 2, axis=1)
         return float(np.sqrt(np.mean(square)))
 
     def error_of(self, slopes: Mapping[str, Array]) -> Array:
@@ -152,9 +155,7 @@ class Fit:
         hardly tell apart each may have any error.
         """
         place = {name: k for k, name in enumerate(self.values)}
-        own, given = (self.root[[place[n] for n in some]] for some in (names, known))
-        # What the known ones leave of the independent combinations.
-        left = own - own @ np.linalg.pinv(given) @ given if len(known) else own
+        left = self._root_given(known)[[place[n] for n in names]]
         found = np.array([self.values[n] for n in names])
         # In errors, however different: of what nothing depends on there is none.
         errors = np.linalg.norm(left, axis=1)
@@ -163,6 +164,11 @@ class Fit:
         # Smallest combination of the independent ones that takes them there: zero where none does.
         least = np.linalg.lstsq(own / errors[:, None], found / errors, rcond=1e-8)[0]
         return float(least @ least) / self._misfit**2
+
+    def _root_given(self, known: Sequence[str]) -> Array:
+        """What known parameters leave of the independent combinations; see root."""
+        given = self.root[[k for k, name in enumerate(self.values) if name in known]]
+        return self.root - self.root @ np.linalg.pinv(given) @ given if len(given) else self.root
 
     @property
     def _misfit(self) -> float:

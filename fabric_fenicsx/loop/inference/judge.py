@@ -11,6 +11,7 @@ was not; noise is what is printed. Holdout runs are looked at for that alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb, log
 
@@ -216,6 +217,10 @@ class Judge:
             self._misfits[model.fit] = Misfit(noise, printed, white)
         return self._misfits[model.fit]
 
+    def noisier_than_stated(self, model: Model) -> bool:
+        """Whether readings would have to scatter by more than was stated."""
+        return self.given is not None and self.misfit(model).reading > CRITERIA.scatter * self.given
+
     def fits(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise, in size, on what it was fitted to.
 
@@ -245,7 +250,7 @@ class Judge:
             error = model.fit.predictive_rms(out)
             count = int(out.sum())
             # One specimen's deviation is a single number, however many readings share it.
-            expected = self.expected_holdout(model.fit, self.misfit(model).noise)
+            expected = self._expected_of(model)
             if self.holdout(model.fit) > CRITERIA.significant * expected:
                 return False
         else:
@@ -254,6 +259,12 @@ class Judge:
         noise = model.fit.variances.noise.typical(self._readings, model.fit.used)
         limit = max(CRITERIA.scatter, self._by_chance(model, count))
         return bool(error * noise <= limit * self.misfit(model).reading)
+
+    def _expected_of(self, model: Model) -> float:
+        """What the error of holdout runs may be: a term without a formula has to be known there."""
+        terms = [v for v, e in zip(model.fit.variants, model.effects, strict=True) if not e.listed]
+        known = [p.name for v in terms for p in v.parameters]
+        return self.expected_holdout(model.fit, self.misfit(model).noise, known)
 
     def settled(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise alone, or so little else that nothing can be made of it."""
@@ -306,10 +317,13 @@ class Judge:
         out, own = self.held_rows, self._readings.first if rows is None else rows
         return model.rms(out & own) if out.any() else self.left_out(model).error(own)
 
-    def expected_holdout(self, model: Fit, noise: float) -> float:
-        """What the model itself expects the held-out error of holdout runs to be; NaN without."""
+    def expected_holdout(self, model: Fit, noise: float, known: Sequence[str] = ()) -> float:
+        """What the model itself expects the held-out error of holdout runs to be; NaN without.
+
+        As if some common parameters were known to be as found.
+        """
         out = self.held_rows & self._readings.first
-        return float(np.hypot(noise, model.prediction_std(out))) if out.any() else float("nan")
+        return float(np.hypot(noise, model.prediction_std(out, known))) if out.any() else np.nan
 
     @property
     def source(self) -> str:

@@ -30,6 +30,7 @@ __all__ = [
     "outliers",
     "quantum",
     "roughness",
+    "steps_back",
     "whiteness",
 ]
 
@@ -94,9 +95,8 @@ class Noise:
     def whitener(self, readings: Readings, rows: Flags) -> Whitener:
         """For some readings."""
         at = np.flatnonzero(rows)
-        same = readings.chain[at[1:]] == readings.chain[at[:-1]]
-        neighbour = np.zeros(len(at))
-        neighbour[1:] = np.where(same, self.correlation ** np.diff(at), 0.0)
+        back = steps_back(readings, rows)
+        neighbour = np.where(back > 0, self.correlation**back, 0.0)
         error = readings.model_error
         return Whitener(self.sigma(readings)[at], neighbour, None if error is None else error[at])
 
@@ -128,6 +128,15 @@ class Whiteness:
     def structured(self) -> bool:
         """Something is left in the residual, whatever its size."""
         return self.least < CRITERIA.structure_p
+
+
+def steps_back(readings: Readings, rows: Flags) -> npt.NDArray[np.int_]:
+    """Places from each of some readings to the one before it; 0 at the start of a line, (n,)."""
+    at = np.flatnonzero(rows)
+    same = readings.chain[at[1:]] == readings.chain[at[:-1]]
+    back = np.zeros(len(at), dtype=int)
+    back[1:] = np.where(same, np.diff(at), 0)
+    return back
 
 
 def estimated_noise(residual: Array, readings: Readings, rows: Flags) -> float:

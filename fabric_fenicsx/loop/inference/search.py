@@ -10,7 +10,8 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 
 Where no effect with a name accounts for the fitted readings the same is done with terms without a
 formula beside them: what acts on what, and by what does it go? Where a single one does, such terms
-may be its rivals (see Experiment.terms_are_rivals). Before several effects with a name are fitted
+may be its rivals (see Experiment.terms_are_rivals), and are where readings would have to scatter by
+more than was stated. Before several effects with a name are fitted
 together a single term is looked for: if it leaves noise, and they far more, they are not.
 """
 
@@ -70,9 +71,10 @@ def diagnose_test(
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
         terms, least = list(experiment.terms), -CRITERIA.decisive
-    elif experiment.terms_are_rivals and found.effects:
-        (own,) = found.effects
-        terms = [t for t in experiment.terms if own.name not in t.general_form_of]
+    elif search.noisier_than_stated or (experiment.terms_are_rivals and found.effects):
+        # Before readings are said to scatter by more than was stated terms are tried.
+        own = [effect.name for effect in found.effects]
+        terms = [t for t in experiment.terms if not set(own) & set(t.general_form_of)]
         least = CRITERIA.decisive
     else:
         return found
@@ -88,7 +90,7 @@ def diagnose_test(
         elif search.effects_needed == 1:
             single.name(other, other.effects[0], search, found.effects[0])
         return _beside(other, found)
-    if search.effects_needed == 1:
+    if search.effects_needed == 1 and experiment.terms_are_rivals:
         search.name_terms(found, final, single, other)
     return found
 
@@ -124,6 +126,8 @@ class _Search:
         self.accounted = False
         #: How many effects it has.
         self.effects_needed = 0
+        #: Whether noise is more than was stated for that.
+        self.noisier_than_stated = False
         #: Models of one effect, the best first.
         self.singles: Sequence[Model] = ()
         #: Asked, where one effect does not do, whether another search has found what does.
@@ -152,6 +156,7 @@ class _Search:
         verdict = self._verdict(baseline, chosen)
         self.accounted = self.judge.accounts(chosen, baseline)
         self.effects_needed = len(chosen.effects)
+        self.noisier_than_stated = self.judge.noisier_than_stated(chosen)
         nearest = _nearest(levels)
         final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
         if final.effects:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -27,7 +28,7 @@ from scipy.stats import chi2
 
 from .criteria import CRITERIA
 from .experiment import Readings
-from .noise import Noise
+from .noise import Noise, steps_back
 
 __all__ = ["Estimate", "Linearised", "Variances", "averaged", "chance_of_no_misfit", "estimate"]
 
@@ -44,10 +45,6 @@ SMALL_SCATTER = 0.03
 ENOUGH = 1e-4
 #: ... in all, beyond which that step, which is a share of it, was not yet a small one.
 FAR = 100.0
-#: Step of a difference quotient.
-DIFFERENCE = 1e-5
-#: Products of columns that are kept, for different correlations and shares.
-KEPT = 20
 #: Values of a scatter that are tried.
 TRIED = 21
 #: Largest correlation of neighbours; of a single run slower noise is not told from a misfit.
@@ -237,6 +234,110 @@ def chance_of_no_misfit(with_smooth: Estimate, without: Estimate) -> float:
     return float(0.5 * chi2.sf(gain, 1)) if gain > 0.0 else 1.0
 
 
+class _Columns:
+    """All columns and the residual, and what makes them white.
+
+    Args:
+        at: a fit.
+        columns: with the residual as the last, (n, m).
+        lines: those of them that grow with the noise of a reading.
+
+    Attributes:
+        weighted: columns times the readings' weights; the lines as they are.
+        lines: see above.
+        reading: y of noise's formula, (n,).
+        weight: of each reading, (n,).
+        back: places from the reading before, see ``noise.steps_back``.
+    """
+
+    def __init__(self, at: Linearised, columns: Array, lines: slice) -> None:
+        self.reading, self.weight = at.readings.observed[at.rows], at.readings.weight[at.rows]
+        self.back, self.lines = steps_back(at.readings, at.rows), lines
+        self.weighted = columns * self.weight[:, None]
+        self.weighted[:, lines] = columns[:, lines]
+
+
+class _White:
+    """Columns that are white for a floor of one, and what goes with them.
+
+    Args:
+        of: the columns.
+        share: κ, of a reading, over the floor.
+        correlation: φ of neighbours.
+
+    Attributes:
+        share, correlation: see above.
+        columns: W, (n, m).
+        products: WᵀW.
+        determinant: log of that of the noise's covariance.
+        ratio: root mean square of sigma over the floor.
+        ratio_slope: derivative of its logarithm in κ².
+    """
+
+    def __init__(self, of: _Columns, share: float, correlation: float) -> None:
+        self.share, self.correlation, self._of = share, correlation, of
+        square = 1.0 + (share * of.reading) ** 2
+        self._along = np.where(of.back > 0, correlation**of.back, 0.0)
+        self._left = np.sqrt(1.0 - self._along**2)
+        self._plain = of.weighted / np.sqrt(square)[:, None]
+        self._plain[:, of.lines] = of.weighted[:, of.lines]
+        self.columns = self._plain.copy()
+        self.columns[1:] -= self._along[1:, None] * self._plain[:-1]
+        self.columns /= self._left[:, None]
+        self.products = self.columns.T @ self.columns
+        log = np.sum(np.log(square)) - 2.0 * np.sum(np.log(of.weight))
+        self.determinant = float(log + 2.0 * np.sum(np.log(self._left)))
+        self.ratio = float(np.sqrt(np.mean(square)))
+        self.ratio_slope = float(np.mean(of.reading**2) / (2.0 * np.mean(square)))
+        #: Derivative of a reading's ln σ in κ².
+        self._growth = of.reading**2 / (2.0 * square)
+
+    def slopes(self, by: Array) -> tuple[float, float]:
+        """Derivatives of Σ by W and of the determinant in κ² and in φ."""
+        of, along, left = self._of, self._along, self._left
+        by = by / left[:, None]
+        own, before = self._with_neighbours(by, slice(None))
+        of_along = along / left**2 * (own - along * before - 2.0) - before
+        back = np.maximum(of.back, 1)
+        of_correlation = np.where(of.back > 0, back * self.correlation ** (back - 1), 0.0)
+        own_lines, before_lines = self._with_neighbours(by, of.lines)
+        growth = self._growth
+        of_share = 2.0 * growth.sum() - growth @ (own - own_lines)
+        of_share += (growth[:-1] * along[1:]) @ (before - before_lines)[1:]
+        return float(of_share), float(of_along @ of_correlation)
+
+    def _with_neighbours(self, by: Array, columns: slice) -> tuple[Array, Array]:
+        """Row by row, sums over columns of ``by`` times this row and the one before it, (n,)."""
+        before = np.zeros(len(by))
+        own = np.einsum("ij,ij->i", by[:, columns], self._plain[:, columns])
+        before[1:] = np.einsum("ij,ij->i", by[1:, columns], self._plain[:-1, columns])
+        return own, before
+
+
+@dataclass(frozen=True, slots=True)
+class _Solved:
+    """The system that the components make of white columns, and the likelihoods.
+
+    Attributes:
+        noise, taus: the components.
+        white: the columns.
+        scale: s of each but the residual.
+        matrix: M = 1 + s WᵀW s; no 1 where a column's size is free.
+        by: s Wᵀr.
+        chi: weighted sum of squares.
+        costs: −2 log restricted likelihood and −2 log likelihood.
+    """
+
+    noise: Noise
+    taus: Array
+    white: _White
+    scale: Array
+    matrix: Array
+    by: Array
+    chi: float
+    costs: tuple[float, float]
+
+
 class _Problem:
     """The likelihood as a function of the components."""
 
@@ -257,11 +358,17 @@ class _Problem:
         self._blocks = [np.asarray(block) for block in at.specimens.values()]
         self._blocks = [block[:, np.any(block != 0.0, axis=0)] for block in self._blocks]
         self._lines = _lines(at.readings, at.rows) if smooth else np.zeros((len(at.residual), 0))
-        self._known: dict[tuple[float, float], tuple[Array, float, float]] = {}
-        chain = at.readings.chain[at.rows]
+        error = at.readings.model_error
+        errors = np.zeros((len(at.residual), 0)) if error is None else error[at.rows]
+        self._fixed = np.ones(errors.shape[1])
+        parts = [self._common, *self._blocks, self._lines, errors, at.residual[:, None]]
+        first = self._common.shape[1] + sum(block.shape[1] for block in self._blocks)
+        among = slice(first, first + self._lines.shape[1])
+        self._columns = _Columns(at, np.concatenate(parts, axis=1), among)
+        self._known: _White | None = None
         several = len(np.unique(at.readings.run[at.rows])) > 1
         self.most_correlated = MOST_CORRELATED if several else OF_ONE_RUN
-        if not (chain[1:] == chain[:-1]).any():
+        if not steps_back(at.readings, at.rows).any():
             self.most_correlated = 0.0
 
     def split(self, x: Array) -> tuple[Noise, Array, float]:
@@ -277,73 +384,106 @@ class _Problem:
 
     def cost(self, x: Array) -> tuple[float, float]:
         """−2 log restricted likelihood and −2 log likelihood."""
-        noise, taus, omega = self.split(x)
-        G, determinant, ratio = self._whitened(noise)
-        p = self._common.shape[1]
-        scale = np.concatenate([np.ones(p), self._scales(taus, omega * noise.floor)]) / noise.floor
-        q = len(scale) - p
-        M = G[:-1, :-1] * np.outer(scale, scale)
-        M[np.arange(p, p + q), np.arange(p, p + q)] += 1.0
-        # Columns that are alike to round-off, however large, keep it positive.
-        M[np.arange(p + q), np.arange(p + q)] *= 1.0 + 1e-12
-        by = G[:-1, -1] * scale / noise.floor
-        factor = np.linalg.cholesky(M)
-        half = solve_triangular(factor, by, lower=True, check_finite=False) if len(M) else by
-        chi = float(G[-1, -1]) / noise.floor**2 - float(half @ half)
-        whole = 2.0 * float(np.sum(np.log(np.diag(factor))))
-        part = np.linalg.cholesky(M[p:, p:]) if q else np.ones((1, 1))
-        random = 2.0 * float(np.sum(np.log(np.diag(part))))
-        own = determinant + 2.0 * len(self._at.residual) * np.log(noise.floor)
-        rest = chi + own + self._prior(noise, taus, noise.floor * ratio)
-        return rest + whole, rest + random
+        return self._solved(x).costs
 
     def with_slope(self, x: Array) -> tuple[float, Array]:
-        """What is minimised from its value at the start, with its derivatives, by differences."""
-        value = self.cost(x)[self.of]
-        step = DIFFERENCE * np.maximum(1.0, np.abs(x))
-        moved = x + np.diag(step)
-        slope = np.array([self.cost(at)[self.of] - value for at in moved]) / step
-        return value - self.origin, slope
+        """What is minimised from its value at the start, with its derivatives."""
+        found = self._solved(x)
+        return found.costs[self.of] - self.origin, self._slope(found)
+
+    def _solved(self, x: Array) -> _Solved:
+        noise, taus, omega = self.split(x)
+        white = self._whitened(noise)
+        G, floor, p = white.products, noise.floor, self._common.shape[1]
+        scale = np.concatenate([np.ones(p), self._scales(taus, omega * floor), self._fixed]) / floor
+        M = G[:-1, :-1] * np.outer(scale, scale)
+        diagonal = np.einsum("ii->i", M)
+        diagonal[p:] += 1.0
+        # Columns that are alike to round-off, however large, keep it positive.
+        diagonal *= 1.0 + 1e-12
+        by = G[:-1, -1] * scale / floor
+        factor = np.linalg.cholesky(M)
+        half = solve_triangular(factor, by, lower=True, check_finite=False) if len(M) else by
+        chi = float(G[-1, -1]) / floor**2 - float(half @ half)
+        whole = 2.0 * float(np.sum(np.log(np.diag(factor))))
+        part = np.linalg.cholesky(M[p:, p:])
+        random = 2.0 * float(np.sum(np.log(np.diag(part))))
+        own = white.determinant + 2.0 * len(self._at.residual) * np.log(floor)
+        rest = chi + own + self._prior(noise, taus, floor * white.ratio)
+        return _Solved(noise, taus, white, scale, M, by, chi, (rest + whole, rest + random))
+
+    def _slope(self, found: _Solved) -> Array:
+        """Derivatives of what is minimised.
+
+        With V = f² (Σ₁ + ω² S Sᵀ) + Σ τ² D Dᵀ, P its inverse less what θ takes off and ρ = P r, a
+        column d of S or D whose variance is v has ∂/∂v = dᵀPd − (dᵀρ)². V as a whole and floor and
+        τ together scale alike, which gives ∂/∂f; Σ₁ goes by way of the white columns W, of which
+        the cost knows the products WᵀW alone: ∂/∂W = 2 W H.
+        """
+        noise, white, s, floor = found.noise, found.white, found.scale, found.noise.floor
+        G, p, n = white.products, self._common.shape[1], len(self._at.residual)
+        inverse = np.linalg.inv(found.matrix)
+        u = inverse @ found.by
+        if self.of:
+            inverse[:p], inverse[:, :p] = 0.0, 0.0
+            inverse[p:, p:] = np.linalg.inv(found.matrix[p:, p:])
+        Y = G[:-1, :-1] * s / floor
+        of_columns = np.diag(G)[:-1] / floor**2 - np.einsum("ij,ij->i", Y @ inverse, Y)
+        of_columns -= (G[:-1, -1] / floor**2 - Y @ u) ** 2
+        ends = np.cumsum([p, *(b.shape[1] for b in self._blocks), self._lines.shape[1]])
+        *of_taus, of_omega = (float(of_columns[i:j].sum()) for i, j in pairwise(ends))
+        fixed = float(of_columns[ends[-1] :].sum())
+        taken = 0 if self.of else p
+        of_floor = 2.0 * (n - taken - found.chi - fixed - np.dot(found.taus**2, of_taus))
+        H = np.empty_like(G)
+        H[:-1, :-1] = (inverse + np.outer(u, u)) * np.outer(s, s)
+        H[:-1, -1] = H[-1, :-1] = -s * u / floor
+        H[-1, -1] = 1.0 / floor**2
+        of_share, of_correlation = white.slopes(2.0 * white.columns @ H)
+        square = (noise.share / floor) ** 2
+        typical = 0.0
+        if self._given is not None:
+            away = np.log(floor * white.ratio / self._given)
+            typical = 2.0 * away / CRITERIA.stated_within**2
+            of_share += typical * white.ratio_slope
+        usual = CRITERIA.usual_share
+        return np.array(
+            [
+                of_floor + typical - 2.0 * square * of_share,
+                of_correlation,
+                (of_share / floor**2 + usual**-2) * SHARE_UNIT,
+                *((np.array(of_taus) + self._usual**-2) * SCATTER_UNIT),
+                *[of_omega * floor**2] * self._smooth,
+            ]
+        )
 
     def white(self, x: Array) -> Array:
         """Residual that is left with the specimens' deviations, but without smooth lines, white."""
         noise, taus, omega = self.split(x)
-        W = self._unit_white(noise) / noise.floor
+        whiten = noise.whitener(self._at.readings, self._at.rows)
+        sizes = noise.sigma(self._at.readings)[self._at.rows]
+        lines = self._lines * sizes[:, None]
+        A = whiten(np.concatenate([self._common, *self._blocks, lines], axis=1))
+        y = whiten(self._at.residual)
         p = self._common.shape[1]
-        A = W[:, :-1] * np.concatenate([np.ones(p), self._scales(taus, omega * noise.floor)])
+        A *= np.concatenate([np.ones(p), self._scales(taus, omega)])
         q = A.shape[1] - p
         stacked = np.concatenate([A, np.eye(p + q)[p:]])
-        y = np.concatenate([W[:, -1], np.zeros(q)])
-        solution = np.linalg.lstsq(stacked, y, rcond=None)[0]
+        solution = np.linalg.lstsq(stacked, np.concatenate([y, np.zeros(q)]), rcond=None)[0]
         kept = p + sum(block.shape[1] for block in self._blocks)
-        return np.asarray(W[:, -1] - A[:, :kept] @ solution[:kept])
+        return np.asarray(y - A[:, :kept] @ solution[:kept])
 
     def _scales(self, taus: Array, omega: float) -> Array:
         """Of the random columns."""
         parts = [np.full(b.shape[1], tau) for b, tau in zip(self._blocks, taus, strict=True)]
         return np.concatenate([*parts, np.full(self._lines.shape[1], omega)])
 
-    def _unit_white(self, noise: Noise) -> Array:
+    def _whitened(self, noise: Noise) -> _White:
         """All columns and the residual, white for a floor of one."""
-        at = self._at
-        unit = Noise(1.0, noise.share / noise.floor, noise.correlation)
-        whiten = unit.whitener(at.readings, at.rows)
-        self._determinant = whiten.log_determinant
-        sizes = unit.sigma(at.readings)[at.rows]
-        lines = self._lines * sizes[:, None]
-        columns = [self._common, *self._blocks, lines, at.residual[:, None]]
-        return whiten(np.concatenate(columns, axis=1))
-
-    def _whitened(self, noise: Noise) -> tuple[Array, float, float]:
-        """Products of these columns, log determinant, and rms of sigma, all for a floor of one."""
-        key = (noise.share / noise.floor, noise.correlation)
-        if key not in self._known:
-            if len(self._known) > KEPT:
-                self._known.clear()
-            W = self._unit_white(noise)
-            typical = Noise(1.0, key[0], key[1]).typical(self._at.readings, self._at.rows)
-            self._known[key] = (W.T @ W, self._determinant, typical)
-        return self._known[key]
+        known, share = self._known, noise.share / noise.floor
+        if known is None or (known.share, known.correlation) != (share, noise.correlation):
+            self._known = known = _White(self._columns, share, noise.correlation)
+        return known
 
     def _prior(self, noise: Noise, taus: Array, typical: float) -> float:
         prior = float(np.sum((taus / self._usual) ** 2))
