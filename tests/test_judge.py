@@ -54,6 +54,6 @@ def test_a_term_without_a_formula_has_to_be_known_where_it_foretells():
 def test_noise_beyond_what_was_stated():
     for scatter, more in ((SIGMA, False), (1.1 * SIGMA, False), (2.0 * SIGMA, True)):
         judge, model = judged(scatter=scatter)
-        assert judge.noisier_than_stated(model) is more
+        assert judge.doubtful_noise(model) is more
     judge, model = judged(stated=None, scatter=2.0 * SIGMA)
-    assert not judge.noisier_than_stated(model)
+    assert not judge.doubtful_noise(model)

@@ -49,6 +49,8 @@ class Criteria:
         laboratories: ... where they are from several laboratories; published.
         usual_share: of a reading that its noise grows by (half-normal prior); convention.
         stated_within: relative sigma of a noise that was stated; convention.
+        slow_noise: correlation of neighbouring readings beyond which noise looks like a misfit;
+            convention.
         readings_per_knot, most_knots: of the smooth line that a misfit is looked for with;
             convention.
         blocks: parts, of several stretches each, that are left out in turn where there is one run;
@@ -95,6 +97,7 @@ class Criteria:
     laboratories: float = 0.6
     usual_share: float = 0.05
     stated_within: float = 0.15
+    slow_noise: float = 0.8
     readings_per_knot: int = 8
     most_knots: int = 20
     blocks: int = 5

@@ -217,9 +217,11 @@ class Judge:
             self._misfits[model.fit] = Misfit(noise, printed, white)
         return self._misfits[model.fit]
 
-    def noisier_than_stated(self, model: Model) -> bool:
-        """Whether readings would have to scatter by more than was stated."""
-        return self.given is not None and self.misfit(model).reading > CRITERIA.scatter * self.given
+    def doubtful_noise(self, model: Model) -> bool:
+        """Whether noise is more than was stated or, where none was, as slow as a misfit."""
+        if self.given is None:
+            return model.estimate.variances.noise.correlation > CRITERIA.slow_noise
+        return self.misfit(model).reading > CRITERIA.scatter * self.given
 
     def fits(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise, in size, on what it was fitted to.

@@ -11,7 +11,7 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 Where no effect with a name accounts for the fitted readings the same is done with terms without a
 formula beside them: what acts on what, and by what does it go? Where a single one does, such terms
 may be its rivals (see Experiment.terms_are_rivals), and are where readings would have to scatter by
-more than was stated. Before several effects with a name are fitted
+more than was stated or go together for long. Before several effects with a name are fitted
 together a single term is looked for: if it leaves noise, and they far more, they are not.
 """
 
@@ -71,8 +71,8 @@ def diagnose_test(
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
         terms, least = list(experiment.terms), -CRITERIA.decisive
-    elif search.noisier_than_stated or (experiment.terms_are_rivals and found.effects):
-        # Before readings are said to scatter by more than was stated terms are tried.
+    elif search.doubtful_noise or (experiment.terms_are_rivals and found.effects):
+        # Before noise is said to be more than was stated, or as slow as a misfit, terms are tried.
         own = [effect.name for effect in found.effects]
         terms = [t for t in experiment.terms if not set(own) & set(t.general_form_of)]
         least = CRITERIA.decisive
@@ -126,8 +126,8 @@ class _Search:
         self.accounted = False
         #: How many effects it has.
         self.effects_needed = 0
-        #: Whether noise is more than was stated for that.
-        self.noisier_than_stated = False
+        #: Whether noise is more than was stated for that, or slow.
+        self.doubtful_noise = False
         #: Models of one effect, the best first.
         self.singles: Sequence[Model] = ()
         #: Asked, where one effect does not do, whether another search has found what does.
@@ -156,7 +156,7 @@ class _Search:
         verdict = self._verdict(baseline, chosen)
         self.accounted = self.judge.accounts(chosen, baseline)
         self.effects_needed = len(chosen.effects)
-        self.noisier_than_stated = self.judge.noisier_than_stated(chosen)
+        self.doubtful_noise = self.judge.doubtful_noise(chosen)
         nearest = _nearest(levels)
         final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
         if final.effects:

@@ -28,8 +28,6 @@ OTHER_UNITS = {"drift_N_s": "N/s"}
 SMALL_SCATTER = 0.02
 #: Share by which an error is smaller than another one.
 SMALLER = 0.01
-#: Correlation of neighbouring readings beyond which noise looks like a misfit.
-SLOW_NOISE = 0.8
 
 
 def parameter_unit(name: str) -> str:
@@ -168,7 +166,7 @@ def _noise(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"Readings scatter by other than the {_value(report, noise['stated'])} stated."
     if noise["other_than_white"]:
         yield f"The noise is {noise['words']}."
-    if noise["correlation"] > SLOW_NOISE:
+    if noise["correlation"] > CRITERIA.slow_noise:
         yield "Noise as slow as that cannot be told from a smooth misfit of the model."
 
 
