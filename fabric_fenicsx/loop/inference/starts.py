@@ -26,8 +26,6 @@ SMALL = 1e-9
 DAMPED = (1.0, 0.3, 0.1, 0.0)
 #: Values of a parameter that the readings jump with, as shares of the one found; then nearer ones.
 AROUND = (np.linspace(0.7, 1.3, 25), np.linspace(0.975, 1.025, 11))
-#: Sigmas between what is expected at the first and the last of them below which nothing jumps.
-NO_JUMP = 0.01
 
 
 Combination = tuple[tuple[Variant, "Signature"], ...]
@@ -104,14 +102,6 @@ def fit_combinations(
             if not found.converged:
                 found = _again(experiment, found, found.values, evaluations, robust)
             fits[k] = _around_jumps(experiment, found, evaluations, robust)
-    sizes = [f.size(robust) for f in fits]
-    for k, size in enumerate(sizes):
-        # From a better value the rest of the model leads to a better one yet.
-        while size <= CRITERIA.second_start * min(sizes):
-            fits[k] = _around_jumps(experiment, fits[k], evaluations, robust)
-            gain, size = size - fits[k].size(robust), fits[k].size(robust)
-            if gain < CRITERIA.decisive:
-                break
     return fits
 
 
@@ -319,18 +309,13 @@ def _around_jumps(
     for name in [p.name for v in found.variants for p in v.parameters if p.jumps]:
         for shares in AROUND:
             linear = ToFirstOrder(experiment, found, found.variances, robust)
-            starts: list[_Start] = []
-            # The ends first: where not even they are different no reading jumps.
-            seen: list[Array] = []
-            for share in (shares[0], shares[-1], *shares[1:-1]):
-                if len(seen) == 2 and np.abs(linear.whitened(seen[1] - seen[0])).max() < NO_JUMP:
-                    break
-                at = found.values | {name: float(found.values[name] * share)}
+            starts = []
+            for value in found.values[name] * shares:
+                at = found.values | {name: float(value)}
                 try:
                     expected, slopes = experiment.predict(found.variants, at)
                 except SolveError:
                     continue
-                seen.append(expected)
                 rest = {n: slopes[n] for n in found.values if n != name}
                 one = Signature(at, expected, expected, rest)
                 r = linear.whitened(experiment.readings.observed - expected)
@@ -345,7 +330,7 @@ def _around_jumps(
                 )
                 if start is not None:
                     starts.append(start)
-            if len(starts) < 3:
+            if not starts:
                 break
             start = min(starts, key=lambda s: s.left)
             moved = {n: v + start.step.get(n, 0.0) for n, v in start.at.items()}
