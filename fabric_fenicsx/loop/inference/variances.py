@@ -29,6 +29,7 @@ from scipy.stats import chi2
 from .criteria import CRITERIA
 from .experiment import Readings
 from .noise import Noise, steps_back
+from .white_columns import Columns, White
 
 __all__ = ["Estimate", "Linearised", "Variances", "averaged", "chance_of_no_misfit", "estimate"]
 
@@ -234,86 +235,6 @@ def chance_of_no_misfit(with_smooth: Estimate, without: Estimate) -> float:
     return float(0.5 * chi2.sf(gain, 1)) if gain > 0.0 else 1.0
 
 
-class _Columns:
-    """All columns and the residual, and what makes them white.
-
-    Args:
-        at: a fit.
-        columns: with the residual as the last, (n, m).
-        lines: those of them that grow with the noise of a reading.
-
-    Attributes:
-        weighted: columns times the readings' weights; the lines as they are.
-        lines: see above.
-        reading: y of noise's formula, (n,).
-        weight: of each reading, (n,).
-        back: places from the reading before, see ``noise.steps_back``.
-    """
-
-    def __init__(self, at: Linearised, columns: Array, lines: slice) -> None:
-        self.reading, self.weight = at.readings.observed[at.rows], at.readings.weight[at.rows]
-        self.back, self.lines = steps_back(at.readings, at.rows), lines
-        self.weighted = columns * self.weight[:, None]
-        self.weighted[:, lines] = columns[:, lines]
-
-
-class _White:
-    """Columns that are white for a floor of one, and what goes with them.
-
-    Args:
-        of: the columns.
-        share: κ, of a reading, over the floor.
-        correlation: φ of neighbours.
-
-    Attributes:
-        share, correlation: see above.
-        columns: W, (n, m).
-        products: WᵀW.
-        determinant: log of that of the noise's covariance.
-        ratio: root mean square of sigma over the floor.
-        ratio_slope: derivative of its logarithm in κ².
-    """
-
-    def __init__(self, of: _Columns, share: float, correlation: float) -> None:
-        self.share, self.correlation, self._of = share, correlation, of
-        square = 1.0 + (share * of.reading) ** 2
-        self._along = np.where(of.back > 0, correlation**of.back, 0.0)
-        self._left = np.sqrt(1.0 - self._along**2)
-        self._plain = of.weighted / np.sqrt(square)[:, None]
-        self._plain[:, of.lines] = of.weighted[:, of.lines]
-        self.columns = self._plain.copy()
-        self.columns[1:] -= self._along[1:, None] * self._plain[:-1]
-        self.columns /= self._left[:, None]
-        self.products = self.columns.T @ self.columns
-        log = np.sum(np.log(square)) - 2.0 * np.sum(np.log(of.weight))
-        self.determinant = float(log + 2.0 * np.sum(np.log(self._left)))
-        self.ratio = float(np.sqrt(np.mean(square)))
-        self.ratio_slope = float(np.mean(of.reading**2) / (2.0 * np.mean(square)))
-        #: Derivative of a reading's ln σ in κ².
-        self._growth = of.reading**2 / (2.0 * square)
-
-    def slopes(self, by: Array) -> tuple[float, float]:
-        """Derivatives of Σ by W and of the determinant in κ² and in φ."""
-        of, along, left = self._of, self._along, self._left
-        by = by / left[:, None]
-        own, before = self._with_neighbours(by, slice(None))
-        of_along = along / left**2 * (own - along * before - 2.0) - before
-        back = np.maximum(of.back, 1)
-        of_correlation = np.where(of.back > 0, back * self.correlation ** (back - 1), 0.0)
-        own_lines, before_lines = self._with_neighbours(by, of.lines)
-        growth = self._growth
-        of_share = 2.0 * growth.sum() - growth @ (own - own_lines)
-        of_share += (growth[:-1] * along[1:]) @ (before - before_lines)[1:]
-        return float(of_share), float(of_along @ of_correlation)
-
-    def _with_neighbours(self, by: Array, columns: slice) -> tuple[Array, Array]:
-        """Row by row, sums over columns of ``by`` times this row and the one before it, (n,)."""
-        before = np.zeros(len(by))
-        own = np.einsum("ij,ij->i", by[:, columns], self._plain[:, columns])
-        before[1:] = np.einsum("ij,ij->i", by[1:, columns], self._plain[:-1, columns])
-        return own, before
-
-
 @dataclass(frozen=True, slots=True)
 class _Solved:
     """The system that the components make of white columns, and the likelihoods.
@@ -330,7 +251,7 @@ class _Solved:
 
     noise: Noise
     taus: Array
-    white: _White
+    white: White
     scale: Array
     matrix: Array
     by: Array
@@ -364,8 +285,8 @@ class _Problem:
         parts = [self._common, *self._blocks, self._lines, errors, at.residual[:, None]]
         first = self._common.shape[1] + sum(block.shape[1] for block in self._blocks)
         among = slice(first, first + self._lines.shape[1])
-        self._columns = _Columns(at, np.concatenate(parts, axis=1), among)
-        self._known: _White | None = None
+        self._columns = Columns(at.readings, at.rows, np.concatenate(parts, axis=1), among)
+        self._known: White | None = None
         several = len(np.unique(at.readings.run[at.rows])) > 1
         self.most_correlated = MOST_CORRELATED if several else OF_ONE_RUN
         if not steps_back(at.readings, at.rows).any():
@@ -478,11 +399,11 @@ class _Problem:
         parts = [np.full(b.shape[1], tau) for b, tau in zip(self._blocks, taus, strict=True)]
         return np.concatenate([*parts, np.full(self._lines.shape[1], omega)])
 
-    def _whitened(self, noise: Noise) -> _White:
+    def _whitened(self, noise: Noise) -> White:
         """All columns and the residual, white for a floor of one."""
         known, share = self._known, noise.share / noise.floor
         if known is None or (known.share, known.correlation) != (share, noise.correlation):
-            self._known = known = _White(self._columns, share, noise.correlation)
+            self._known = known = White(self._columns, share, noise.correlation)
         return known
 
     def _prior(self, noise: Noise, taus: Array, typical: float) -> float:
