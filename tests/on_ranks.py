@@ -49,17 +49,23 @@ def tangent_norm(comm, *, crossings=True):
     return A.norm(), F.norm()
 
 
-def solved(comm):
-    """Displacements and shear angles of the net under two corner forces."""
-    model = small_model(comm)
+def pulled_at_corners(model, *forces):
+    """Statics of a net after three steps to a force at the end of its first and its last warp."""
     statics = Statics(model, force_tolerance=1e-10)
     top = model.net.ends[model.net.tow_family == 0, 1]
 
     def load(part):
-        for node, force in ((top[0], [0.1, 0.0, 0.3]), (top[-1], [0.2, 0.1, -0.4])):
+        for node, force in zip((top[0], top[-1]), forces, strict=True):
             set_loads(model, node, part * np.array([*force, 0.0, 0.0, 0.0]))
 
     statics.run(3, load)
+    return statics
+
+
+def solved(comm):
+    """Displacements and shear angles of the net under two corner forces."""
+    model = small_model(comm)
+    statics = pulled_at_corners(model, [0.1, 0.0, 0.3], [0.2, 0.1, -0.4])
     model.system.set_increment(model.disc.vector())
     return statics.displacements, model.shear_angles()
 
@@ -89,14 +95,7 @@ def by_fronts(comm):
     supports = [Support(feet, (0, 1, 2, 3, 4, 5))]
     model = Model(net, SECTION, crossovers=LAW, supports=supports, comm=comm)
     assert model.system.in_blocks
-    statics = Statics(model, force_tolerance=1e-10)
-    top = model.net.ends[model.net.tow_family == 0, 1]
-
-    def load(part):
-        for node, force in ((top[0], [0.02, 0.0, 0.05]), (top[-1], [0.03, 0.02, -0.06])):
-            set_loads(model, node, part * np.array([*force, 0.0, 0.0, 0.0]))
-
-    statics.run(3, load)
+    statics = pulled_at_corners(model, [0.02, 0.0, 0.05], [0.03, 0.02, -0.06])
     newton = statics.stepper.newton
     solver = newton._tangents[True]._solver
     edge = len(solver._dense) if isinstance(solver, ByFronts) else None

@@ -28,7 +28,7 @@ from scipy.stats import chi2
 
 from .criteria import CRITERIA
 from .experiment import Readings
-from .noise import Noise, steps_back
+from .noise import Noise
 from .white_columns import Columns, White
 
 __all__ = ["Estimate", "Linearised", "Variances", "averaged", "chance_of_no_misfit", "estimate"]
@@ -289,7 +289,7 @@ class _Problem:
         self._known: White | None = None
         several = len(np.unique(at.readings.run[at.rows])) > 1
         self.most_correlated = MOST_CORRELATED if several else OF_ONE_RUN
-        if not steps_back(at.readings, at.rows).any():
+        if not self._columns.back.any():
             self.most_correlated = 0.0
 
     def split(self, x: Array) -> tuple[Noise, Array, float]:

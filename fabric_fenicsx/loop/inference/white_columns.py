@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .experiment import Readings
-from .noise import steps_back
+from .noise import Whitener, steps_back
 
 __all__ = ["Columns", "White"]
 
@@ -69,12 +69,10 @@ class White:
         self._left = np.sqrt(1.0 - self._along**2)
         self._plain = of.weighted / np.sqrt(square)[:, None]
         self._plain[:, of.lines] = of.weighted[:, of.lines]
-        self.columns = self._plain.copy()
-        self.columns[1:] -= self._along[1:, None] * self._plain[:-1]
-        self.columns /= self._left[:, None]
+        whiten = Whitener(np.sqrt(square) / of.weight, self._along)
+        self.columns = whiten.independent(self._plain)
         self.products = self.columns.T @ self.columns
-        log = np.sum(np.log(square)) - 2.0 * np.sum(np.log(of.weight))
-        self.determinant = float(log + 2.0 * np.sum(np.log(self._left)))
+        self.determinant = whiten.log_determinant
         self.ratio = float(np.sqrt(np.mean(square)))
         self.ratio_slope = float(np.mean(of.reading**2) / (2.0 * np.mean(square)))
         #: Derivative of a reading's ln σ in κ².
