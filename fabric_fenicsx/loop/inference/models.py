@@ -28,6 +28,9 @@ MOST_NEAR, OF_A_SET = 6, 2
 REFINED = 3
 #: ... if their criterion is within this of the best.
 REFINED_WITHIN = 60.0
+#: Difference of criteria below which a form of fewer parameters is the better one: another that has
+#: one on its bound is the same model.
+AS_GOOD = 1.0
 
 
 class Models:
@@ -223,7 +226,7 @@ class Models:
             same = [m for m in rest if m.fit.variants == model.fit.variants]
             rest = [m for m in rest if m not in same or m.criterion < model.criterion - 1.0]
             refined.append(model)
-        return sorted(refined, key=lambda m: m.criterion) + rest
+        return _simplest_first(sorted(refined, key=lambda m: m.criterion)) + rest
 
     def by_strength(self, model: Model) -> tuple[Effect, ...]:
         """Effects of a model, that first which changes the expected readings most."""
@@ -239,6 +242,20 @@ class Models:
         if len(model.effects) < 2:
             return model.effects
         return tuple(sorted(model.effects, key=change, reverse=True))
+
+
+def _simplest_first(models: list[Model]) -> list[Model]:
+    """The best first, or one of the same effects that is as good and has fewer parameters."""
+    if not models:
+        return models
+    best = models[0]
+    alike = [
+        m
+        for m in models
+        if set(m.effects) == set(best.effects) and m.criterion < best.criterion + AS_GOOD
+    ]
+    first = min(alike, key=lambda m: len(m.fit.values))
+    return [first, *(m for m in models if m is not first)]
 
 
 def _nothing_left(model: Fit) -> bool:

@@ -43,7 +43,7 @@ HARDLY = 1e-3
 #: Scatter below which specimens may as well be alike.
 SMALL_SCATTER = 0.03
 #: Gain of −2 log likelihood in a step below which it is the last one.
-ENOUGH = 1e-4
+ENOUGH = 1e-7
 #: ... in all, beyond which that step, which is a share of it, was not yet a small one.
 FAR = 100.0
 #: Values of a scatter that are tried.
@@ -204,7 +204,7 @@ def averaged(
     groups = list(at.specimens)
     taus = np.array([found.variances.scatter[group] for group in groups])
     fixed = [0.0, noise.correlation, noise.share**2 / SHARE_UNIT]
-    tried = np.linspace(0.0, 1.0, TRIED) ** 2 * (3.0 * usual_scatter + 4.0 * max(taus, default=0.0))
+    tried = np.linspace(0.0, 1.0, TRIED) ** 2 * (6.0 * usual_scatter + 4.0 * max(taus, default=0.0))
     cells = np.gradient(tried)
     cells[[0, -1]] *= 0.5
     costs = np.empty((len(groups), TRIED))
