@@ -149,11 +149,15 @@ def _formulas(v: str, unit: str, reach: float) -> Iterator[_Formula]:
     yield _Formula(
         lambda x, a, b, n: a * np.sin(2.0 * np.pi * n * x) + b * (np.cos(2.0 * np.pi * n * x) - 1),
         tuple((1.0, 0.1, n) for n in np.arange(1.0, 16.0, 0.25)),
-        lambda a, b, n: (
-            f"{np.hypot(a, b):.3g} sin(2π {v}/{at(1.0 / n)} + {np.arctan2(b, a):.2g}) − "
-            f"{np.hypot(a, b) * np.sin(np.arctan2(b, a)):.2g}"
-        ),
+        lambda a, b, n: _wave(np.hypot(a, b), f"{v}/{at(1.0 / n)}", np.arctan2(b, a)),
     )
+
+
+def _wave(size: float, turns: str, phase: float) -> str:
+    """A sine, less what it is where the variable is nothing."""
+    added = (phase, -size * np.sin(phase))
+    ahead, start = (f"{'−' if n < 0.0 else '+'} {abs(n):.2g}" for n in added)
+    return f"{size:.3g} sin(2π {turns} {ahead}) {start}"
 
 
 def _bump(place: str, width: str, at_zero: float) -> str:

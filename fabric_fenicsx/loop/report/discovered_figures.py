@@ -55,6 +55,7 @@ def discovered_figure(diagnosis: Diagnosis, term: Discovered) -> Figure:
             one = table[table[other] == level]
             _band(axes, one, f" {level:.2g}")
         title += f", at each {other}"
+        axes.margins(x=0.1)
     else:
         _band(axes, table)
     axes.set_xlabel(x)
