@@ -242,7 +242,14 @@ class Judge:
         return left <= found.noise * max(allowed, self._by_chance(model, freedom))
 
     def explains(self, model: Model, baseline: Model) -> bool:
-        """Whether a model leaves noise, in what it was fitted to and in what it was not."""
+        """Whether a model leaves noise, in what it was fitted to and in what it was not.
+
+        A term without a formula that makes holdout runs worse than without it explains nothing,
+        however little is known of it there.
+        """
+        if self.held_rows.any() and not all(effect.listed for effect in model.effects):
+            if self.holdout(model.fit) >= self.holdout(baseline.fit):
+                return False
         return self.fits(model, baseline) and self.foretells(model)
 
     def foretells(self, model: Model) -> bool:

@@ -44,6 +44,9 @@ class _Kind:
     depends_on: tuple[str, ...] = ()
 
 
+#: Coefficients of a product; more of them, and other data are foretold by what cancels in these.
+MOST = 10
+
 HISTORIES = ("largest_angle", "path", "time")
 
 BY = (*HISTORIES, "relative_angle", "rate", "unloading", *FORGETFUL)
@@ -119,6 +122,8 @@ def _shapes(
     """Label and numbers of f_p: as many coefficients of each, places and widths in common."""
     wealth = 1 if variable == "unloading" else 2 if variable in FORGETFUL else kind.wealth
     for label, one, numbers in shapes(name, wealth):
+        if len(powers) * len(one) > MOST:
+            continue
         coefficients = tuple(
             Parameter(f"{name}_{p}_{k + 1}", amplitude=True)
             for p in powers
