@@ -148,6 +148,27 @@ def test_a_model_that_was_settled_is_right_with_its_derivatives():
         assert np.linalg.norm(off) < 0.15 * np.linalg.norm(up - down)
 
 
+def test_derivatives_of_a_law_with_a_dashpot_are_taken_over_differences():
+    """A dashpot has no energy that angles would make least: as they were they do not suffice."""
+    measured, _ = strips({}, lengths=(80.0,))
+    test = CentredBiasExtension([measured])
+    values = {"k1_N": 0.005, "k3_N": 1.0, "c1_N_s": 0.5}
+    steps = {name: 0.05 * value for name, value in values.items()}
+    test.settle((), values, steps=steps)
+    force, slopes = test.predict((), values)
+    for name, step in steps.items():
+        # Half as far the model is solved as well.
+        moved = {**values, name: values[name] + 0.5 * step}
+        test.settle((), moved, steps=None)
+        change = test.predict((), moved)[0] - force
+        off = np.linalg.norm(0.5 * step * slopes[name] - change)
+        assert off < 0.01 * np.linalg.norm(change)
+    test.settle((), values)
+    _, with_angles_as_they_were = test.predict((), values)
+    off = with_angles_as_they_were["c1_N_s"] - slopes["c1_N_s"]
+    assert np.linalg.norm(off) > 0.05 * np.linalg.norm(slopes["c1_N_s"])
+
+
 def test_fits_with_the_locking_of_frames_end_where_nothing_moves():
     """From two starts at the same place, at which every way off makes the residual larger."""
     measured, _ = strips({"tow.stiffness.stretch_N_mm": 25.0}, sizes=(1.0, 1.2))
