@@ -255,9 +255,10 @@ def _fitted(
     for values in starts if start is None else [start]:
         with suppress(SolveError):
             tried.append(search.at(values, {}, derivatives=False))
-    if not tried:
-        return None
-    return search.from_there(min(tried, key=lambda model: model.sum_of_squares))
+    if tried:
+        with suppress(SolveError):
+            return search.from_there(min(tried, key=lambda model: model.sum_of_squares))
+    return None
 
 
 def _weighed(
@@ -307,7 +308,7 @@ def weights_of(errors: Array, strips: int) -> Array:
     """
     likely = (np.nanmin(errors, initial=np.inf) / errors) ** strips
     likely = np.nan_to_num(likely)
-    return likely / likely.sum()
+    return likely / max(float(likely.sum()), 1e-300)
 
 
 def _rms(off: Array) -> float:
