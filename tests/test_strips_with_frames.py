@@ -14,7 +14,7 @@ from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig
 from fabric_fenicsx.loop.kinds.bias_extension.centred import CentredBiasExtension
 from fabric_fenicsx.loop.kinds.bias_extension.frame_law import FRAME_SHARE, foretold, in_thirds
-from fabric_fenicsx.loop.kinds.bias_extension.settling import LEFT, Settling
+from fabric_fenicsx.loop.kinds.bias_extension.settling import LEFT, ROUNDS, Settling
 from fabric_fenicsx.loop.kinds.bias_extension.strip import KNOTS, Curve, solved_strip, strip_case
 from fabric_fenicsx.loop.kinds.bias_extension.with_frames import (
     held,
@@ -186,7 +186,7 @@ def test_fits_with_the_locking_of_frames_end_where_nothing_moves():
         ends.append(search.from_there(search.at(values, {})))
     for found in ends:
         assert found.fit.converged and found.rounds[-1].left <= LEFT < found.rounds[0].left
-        assert found.rounds[-1].objective < found.rounds[0].objective
+        assert len(found.rounds) < ROUNDS
     one, other = (found.fit for found in ends)
     free = [name for name in one.values if name not in one.at_bound]
     assert compliance in free

@@ -46,8 +46,9 @@ class Round:
 
     Attributes:
         values: of the parameters.
-        objective: −2 log of the likelihood there; of a fit with variances that are given, its sum
-            of squares.
+        objective: −2 log of the largest likelihood that is foretold about it, that of the place
+            itself where nothing is left to go; of a fit with variances that are given, the sum of
+            squares there.
         left: standard errors that are left to go, of the combination that has furthest to go.
         middle: of strips, the angle of the middle at the last fitted reading of each run [degrees].
     """

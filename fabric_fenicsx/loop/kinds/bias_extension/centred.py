@@ -169,7 +169,7 @@ class CentredBiasExtension(BiasExtension):
             self._about = None
 
     def _set(self, runs: Sequence[int], ways: Sequence[Way]) -> Solved:
-        """Strips of some runs, beside others as they were last solved, of which nothing is asked."""
+        """Strips of some runs beside others, as they were last, of which nothing is asked."""
         first = self._mixture[0].solved
         every = list(first.ways)
         for run, way in zip(runs, ways, strict=True):
