@@ -2,12 +2,13 @@
 
     Q(θ, δ) = |W (y − F(θ (1 + δ)))|² + Σ δ²/τ²  ->  min
 
-with F solved and not foretold, and W and τ as the model itself leaves the readings (see variances).
+with F solved and not foretold, and W and τ as the model itself leaves the readings (see variances),
+in the first rounds of a fit anew in each, then as they are.
 About a place where strips were solved (see centred) the least Q is known at once; there they are
 solved anew, on a part of the way to it where the whole way does not make Q smaller. What Q would
 still fall by, ΔQ, is the square of the way that is left, in standard errors of that combination of
 the parameters that has furthest to go (Gauss-Newton's decrement). A fit has converged where that is
-a small share of one, with the variances of that same place.
+a small share of one.
 """
 
 from __future__ import annotations
@@ -35,8 +36,9 @@ Flags = npt.NDArray[np.bool_]
 Deviations = Mapping[str, Array]
 """Of all specimens, by group of parameters; see Fit."""
 
-#: Standard errors that nothing may have to go any more, and rounds at most.
-LEFT, ROUNDS = 0.1, 15
+#: Standard errors that nothing may have to go any more; rounds at most, and of these the first ones
+#: in which variances are looked for.
+LEFT, ROUNDS, WITH_VARIANCES = 0.1, 15, 4
 #: How often a way is made shorter that leads nowhere, to which shares of what it was.
 SHORTER, LEAST, MOST = 5, 0.1, 0.5
 #: Step of a derivative in a parameter of the law, over its standard error.
@@ -115,7 +117,8 @@ class Settling:
         """Fit the model from a place on."""
         rounds, converged = list[Round](), False
         while True:
-            there, objective = self._with_its_variances(self.at(there.values, there.deviations))
+            there = self.at(there.values, there.deviations)
+            there, objective = self._with_its_variances(there, len(rounds) < WITH_VARIANCES)
             ahead = self.ahead(there)
             fall = max(there.sum_of_squares - ahead.sum_of_squares, 0.0)
             left = float(np.sqrt(fall)) / there.misfit
@@ -131,13 +134,15 @@ class Settling:
             there = better or there
         return Settled(replace(there, converged=converged), tuple(rounds), self)
 
-    def _with_its_variances(self, there: Fit) -> tuple[Fit, float]:
-        """A model with its own variances, and its objective; see Round."""
+    def _with_its_variances(self, there: Fit, anew: bool) -> tuple[Fit, float]:
+        """A model, with its own variances if they are to be found anew, and its objective."""
         if self._judge is None:
             return there, there.sum_of_squares
         weighed = self._judge.weighed(there, ())
-        self._variances = self._judge.averaged(weighed)
-        return self.at(there.values, there.deviations), weighed.estimate.likelihood
+        if anew:
+            self._variances = self._judge.averaged(weighed)
+            there = self.at(there.values, there.deviations)
+        return there, weighed.estimate.likelihood
 
     def _better(self, there: Fit, ahead: Fit, fall: float) -> Fit | None:
         """The model on the way ahead, solved; None where it gets no better on it.
