@@ -8,7 +8,8 @@ About a place where strips were solved (see centred) the least Q is known at onc
 solved anew, on a part of the way to it where the whole way does not make Q smaller. What Q would
 still fall by, ΔQ, is the square of the way that is left, in standard errors of that combination of
 the parameters that has furthest to go (Gauss-Newton's decrement). A fit has converged where that is
-a small share of one.
+a small share of one; of strips that slip, whose forces have corners, where it is less than a half
+and no part of the way ahead makes Q smaller.
 """
 
 from __future__ import annotations
@@ -39,8 +40,11 @@ Deviations = Mapping[str, Array]
 #: Standard errors that nothing may have to go any more; rounds at most, and of these the first ones
 #: in which variances are looked for.
 LEFT, ROUNDS, WITH_VARIANCES = 0.1, 15, 4
+#: ... where no way ahead makes the objective smaller: with every crossing that begins to slip it
+#: has a corner, and is no smoother than that.
+ROUGH = 0.5
 #: How often a way is made shorter that leads nowhere, to which shares of what it was.
-SHORTER, LEAST, MOST = 5, 0.1, 0.5
+SHORTER, LEAST, MOST = 3, 0.1, 0.5
 #: Step of a derivative in a parameter of the law, over its standard error.
 OF_ERROR = 0.3
 
@@ -128,7 +132,9 @@ class Settling:
             if converged or len(rounds) >= ROUNDS:
                 break
             better = self._better(there, ahead, fall)
-            if better is None and self._steps:
+            gain = 0.0 if better is None else there.sum_of_squares - better.sum_of_squares
+            if self._steps and gain <= (LEFT * there.misfit) ** 2:
+                converged = left <= ROUGH
                 break
             self._differentiate(there)
             there = better or there
