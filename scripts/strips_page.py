@@ -30,7 +30,7 @@ from fabric_fenicsx.loop.fabric import fabric_content, write_fabric
 from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.kinds.bias_extension.frame_law import FRAME_SHARE
-from fabric_fenicsx.loop.kinds.bias_extension.settling import LEFT
+from fabric_fenicsx.loop.kinds.bias_extension.settling import LEFT, ROUGH
 from fabric_fenicsx.loop.kinds.bias_extension.with_frames import KEPT, weights_of
 
 Cells = tuple[str, ...]
@@ -450,7 +450,7 @@ JOINED = """Locking is what exceeds the least steep piece of a frame's law. Here
 the same in all strips, in a size within a standard deviation of the laboratories; the rest is each
 frame's own, and the strips have a law of their own at small angles. All is fitted to the strips'
 forces, each strip solved with its own parameters where a round of the fit ends, until nothing would
-move by more than {:g} of its standard error."""
+move by more than {:g} of its standard error, or {:g} where slipping crossings make corners."""
 
 SLIP = """The strip of {size} with `crossover_slip` alone, and where its crossings slipped:"""
 
@@ -511,7 +511,7 @@ def main() -> None:
     if joined:
         titles = "; ".join(ff.read_measurement(f).title for f in arguments.frames)
         text += ["## Strips and picture frames", "", f"The same strips with {titles}.", ""]
-        text += [*(f"{note}\n" for note in of_frames), JOINED.format(LEFT), ""]
+        text += [*(f"{note}\n" for note in of_frames), JOINED.format(LEFT, ROUGH), ""]
         text += table(*of_joined(joined, foretold("Strips and picture frames", out, joined)))
     length, width = SIZE
     text += [f"## {width:g} x {length:g} mm, foretold", "", FORETOLD, "", WEIGHTS, ""]
