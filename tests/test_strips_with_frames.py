@@ -234,4 +234,3 @@ def test_the_middle_of_soft_strips_is_found_with_frames(tmp_path):
     assert any("beyond" in note for note in found.report["notes"])
     assert [m["kept"] for m in found.report["joined"]] == [m.kept for m in d.joined]
     assert sum(m["weight"] for m in found.report["joined"]) == pytest.approx(1.0)
-    assert all(model.settled for model in kept)

@@ -27,6 +27,7 @@ from ...inference.diagnosis import Diagnosis, Joined
 from ...inference.effects import Effect, Variant
 from ...inference.fitting import Fit, groups_of
 from ...inference.judge import Judge
+from ...inference.starts import SMALL
 from ...inference.variances import Variances
 from ...measurement.schema import Measurement
 from ..picture_frame.model import PictureFrame
@@ -198,7 +199,7 @@ def _models(
     """With none of what lets a strip lengthen without shear, with each, and with both.
 
     Of each the form that fits best; both begin where the better of them ended, with little of the
-    other one.
+    other one. Of what nothing is left in the end is no model of its own.
     """
     own = [e for e in anew.effects if e.name in LENGTHENING and (names is None or e.name in names)]
     found: dict[tuple[Effect, ...], Settled] = {}
@@ -214,10 +215,16 @@ def _models(
                 start = {little.name: LITTLE * other.values[little.name], **better.values}
                 sets += [((*better.variants, other.variants[-1]), start)]
             fits = [_fitted(anew, judge, d, forms, start) for forms, start in sets]
-            done = [model for model in fits if model is not None]
+            done = [model for model in fits if model is not None and _of_all(model.fit)]
             if done:
                 found[effects] = min(done, key=_objective)
     yield from found.items()
+
+
+def _of_all(model: Fit) -> bool:
+    """Whether something is left of each effect of a model."""
+    names = [p.name for v in model.variants for p in v.amplitudes]
+    return not any(n in model.at_bound and abs(model.values[n]) <= SMALL for n in names)
 
 
 def _objective(found: Settled) -> float:
