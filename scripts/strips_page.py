@@ -214,7 +214,7 @@ def of_models(
     for model in tried:
         shown = [angles(curves[model.key])] if model.key in curves else []
         told = model.fit, model.left_out, f"{model.weight:.2f}", model.holdout
-        yield cells(model.name, *told, *shown)
+        yield cells(model.name + ending(model), *told, *shown)
     best = report["best"] or report["model"]
     if best["effects"]:
         names = " + ".join(f"`{e['name']}` ({e['variant']})" for e in best["effects"])
@@ -229,10 +229,14 @@ def of_joined(joined: Sequence[Tried], curves: Mapping[str, pd.DataFrame]) -> It
     errors = "fitted, rms [N]", "each left out [N]", "weight", "held out [N]"
     yield cells("with the frames' locking", "share of it", *errors, large)
     for model in joined:
-        name = model.name if model.effects else "pinned"
-        name += "" if model.converged else " (not converged)"
+        name = (model.name if model.effects else "pinned") + ending(model)
         told = model.share, model.fit, model.left_out, f"{model.weight:.2f}", model.holdout
         yield cells(name, *told, angles(curves[model.key]))
+
+
+def ending(model: Tried) -> str:
+    """What is to be said of how the fits of a model ended."""
+    return "" if model.converged else " (not converged)"
 
 
 def of_the_other(other: Any, tried: Sequence[Tried], near: Path, out: Path) -> Iterator[Cells]:

@@ -61,7 +61,8 @@ def tangent_of(system: System, free: PETSc.Vec, *, symmetric: bool, prefix: str)
             return Condensed(system, free, symmetric, prefix, functions)
         if disc.comm.rank == 0:
             _say_once("no C compiler: tangents are factorised whole, at about twice the cost")
-    if disc.comm.size == 1 and not free.array_r.reshape(-1, BLOCK).any(axis=0).all():
+    components = free.array_r.reshape(-1, BLOCK).any(axis=0).sum()
+    if disc.comm.size == 1 and 0 < components < BLOCK:
         return OfComponents(system, free, symmetric, prefix)
     return Whole(system, free, symmetric, prefix)
 
@@ -141,7 +142,8 @@ class OfComponents:
         components = np.flatnonzero(own.any(axis=0))
         self._system = system
         self._kept = (np.arange(len(own))[:, None] * BLOCK + components).ravel()
-        self._inside = np.ix_(components, components)
+        # Of the entries of a stored block, by columns.
+        self._inside = (components[:, None] * BLOCK + components).ravel()
         shape = (net.owned * BLOCK,) * 2
         self.matrix = PETSc.Mat().createAIJ((shape, shape), nnz=0, comm=net.comm)
         self.matrix.assemble()
@@ -174,9 +176,8 @@ class OfComponents:
     def factorise(self) -> None:
         """Factorise the tangent as it was assembled last."""
         P, rows = self._P, self._held
-        # Each block is stored by columns.
-        whole = _stored_blocks(self._A).reshape(-1, BLOCK, BLOCK)
-        _stored_blocks(P)[:] = whole[:, *self._inside].ravel()
+        blocks = _stored_blocks(self._A).reshape(-1, BLOCK * BLOCK)
+        _stored_blocks(P)[:] = blocks[:, self._inside].ravel()
         P.diagonalScale(self._free, self._free)
         if len(rows):
             P.setValuesRCV(rows, rows, np.ones(rows.shape))
