@@ -56,6 +56,9 @@ TOGETHER: dict[str, dict[str, Any]] = {
         "coefficients": [0.5, -0.2],
         "constant": 0.3,
         "shape": "spline",
+        "also_reach": 1.0,
+        "powers": [],
+        "constants": [],
     },
 }
 #: Other values, by the ends of their keys; they are of the order of those of fabrics.
@@ -380,6 +383,20 @@ def test_the_net_and_the_single_crossing_have_the_same_force(law):
 
 def test_a_state_of_rest_that_moves_is_the_same_in_both():
     compare_net_and_crossing(sample("shaped") | {"base": "rest", "constant": 0.02})
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        {"base": "odd", "variable": "largest_angle", "powers": [1, 3], "constant": 0.0},
+        {"base": "viscous", "variable": "path", "powers": [0, 1], "constants": [0.1, 0.2]},
+        {"base": "dissipative", "variable": "path", "powers": [0, 1], "constants": [0.1, 0.2]},
+        {"base": "odd_in_rate", "variable": "rate", "powers": [0, 2], "constant": 0.0},
+    ],
+)
+def test_a_factor_of_two_variables_is_the_same_in_both(numbers):
+    two = {"also": "angle", "also_reach": 0.5, "coefficients": [0.5, -0.2, 0.3, 0.4]}
+    compare_net_and_crossing(sample("shaped") | two | numbers)
 
 
 def compare_net_and_crossing(values):

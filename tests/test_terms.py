@@ -17,7 +17,8 @@ from fabric_fenicsx.loop.kinds.picture_frame import PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.terms import terms
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
-from fabric_fenicsx.loop.report.discovered import _shortest
+from fabric_fenicsx.loop.report.discovered import Discovered, _shortest
+from fabric_fenicsx.loop.report.effect_file import effect_file
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw
 from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw, shape_of
 from fabric_fenicsx.rigs.cases import CrossoverKeys
@@ -61,6 +62,7 @@ PATH = [0.1, 0.3, 0.3, 0.2, -0.1, 0.4]
     [
         ("angle", [0.1, 0.3, 0.3, 0.2, 0.1, 0.4]),
         ("largest_angle", [0.1, 0.3, 0.3, 0.3, 0.3, 0.4]),
+        ("relative_angle", [1.0, 1.0, 1.0, 2.0 / 3.0, 1.0 / 3.0, 1.0]),
         ("path", [0.1, 0.3, 0.3, 0.4, 0.7, 1.2]),
         ("time", [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]),
         ("rate", [0.2, 0.4, 0.0, 0.2, 0.6, 1.0]),
@@ -223,11 +225,12 @@ def travels(*corners):
     return gamma, FRAME * (2 * np.cos(theta) - math.sqrt(2.0))
 
 
-def write(folder, wear, permanent=0.0, guide=0.0):
+def write(folder, wear, permanent=0.0, guide=0.0, below=0.0):
     """Two fitted runs and one held out.
 
     Of the elastic moment, wear (1 − e^(−path/0.6)) is lost, its state of rest is at
-    ``permanent`` max(γ_max − 0.2, 0), and a guide rubs with ``guide`` [N] at 25 ± 8 mm.
+    ``permanent`` max(γ_max − 0.2, 0), and a guide rubs with ``guide`` [N] at 25 ± 8 mm. Below the
+    largest angle the moment is less by ``below`` γ_max sin²(πγ/γ_max).
     """
     folder.mkdir(parents=True)
     rng = np.random.default_rng(5)
@@ -245,6 +248,8 @@ def write(folder, wear, permanent=0.0, guide=0.0):
         rest = permanent * np.maximum(np.maximum.accumulate(gamma) - 0.2, 0.0)
         elastic = K1 * (gamma - rest) + K3 * (gamma - rest) ** 3
         m = elastic * (1.0 - wear * (1.0 - np.exp(-path / 0.6))) + C1 * rate
+        largest = np.maximum.accumulate(np.maximum(gamma, 1e-9))
+        m = m - below * largest * np.sin(np.pi * gamma / largest) ** 2
         force = m * FABRIC**2 / (FRAME * np.sin(np.pi / 4 - gamma / 2))
         force = force + guide * np.sign(np.gradient(D)) * np.exp(-(((D - 25.0) / 8.0) ** 2))
         force = force + NOISE * rng.standard_normal(len(force))
@@ -311,15 +316,20 @@ def test_the_file_is_the_term(worn, tmp_path):
     (effect,) = again["effects"]
     assert effect["name"] == "discovered_1"
     assert effect["parameters"]["discovered_1_amount"] == pytest.approx(1.0, abs=0.02)
-    (own,) = classes_of(run_file(out / "discovered_1.py", "law"), CrossingLaw)
     term = next(e for e in found.diagnoses[0].effects if not e.listed)
     variant = next(v for v in found.diagnoses[0].final.variants if v in term.variants)
-    (law,) = variant.laws(found.diagnoses[0].final.values)
+    assert_same_moments(out / "discovered_1.py", variant, found.diagnoses[0].final.values)
+
+
+def assert_same_moments(file, variant, values):
+    """A file's law has the moments of a form, per area, along a path with a way back."""
+    (own,) = classes_of(run_file(file, "law"), CrossingLaw)
+    (law,) = variant.laws(values)
     area = 25.0
     gammas = np.interp(np.linspace(0.0, 1.0, 40), [0.0, 0.4, 0.7, 1.0], [0.0, 0.5, 0.1, 0.6])
     memory, before = ({}, {}), 0.0
     for gamma in gammas:
-        values = []
+        found = []
         for k, one in enumerate((own.of_case({"amount": 1.0}, area), law)):
             at = Crossing(
                 as_ufl(float(gamma)),
@@ -328,11 +338,11 @@ def test_the_file_is_the_term(worn, tmp_path):
                 lambda value: as_ufl(value) if np.isscalar(value) else value,
                 lambda name, k=k: as_ufl(memory[k].get(name, 0.0)),
             )
-            values.append(float(as_ufl(one.moment(at))))
+            found.append(float(as_ufl(one.moment(at))))
             new = {name: float(as_ufl(value)) for name, value in one.history(at).items()}
             memory[k].clear()
             memory[k].update(new)
-        assert values[0] == pytest.approx(area * values[1], rel=1e-9, abs=1e-12)
+        assert found[0] == pytest.approx(area * found[1], rel=1e-9, abs=1e-12)
         before = gamma
 
 
@@ -369,6 +379,90 @@ def test_the_right_term_leaves_noise(tmp_path, put_in, term, truth):
     x = np.linspace(0.02, 0.98, 25)
     value = [float(as_ufl(shape.value(found.values, as_ufl(float(one))))) for one in x]
     assert np.abs(value - truth(shape.reach * x)).max() < 0.1 * truth(shape.reach * x).max()
+
+
+def test_a_term_over_two_variables_leaves_noise(tmp_path):
+    """Where no form of one over the angle or its largest value does; its file is that term."""
+    experiment = PictureFrame([read_measurement(write(tmp_path / "set", 0.0, below=0.02))])
+    by_name = {term.name: term for term in experiment.terms}
+    rows, holdout = experiment.readings.fit, experiment.readings.holdout
+    white, base = Variances(Noise(NOISE)), {"k1_N": K1, "k3_N": K3, "c1_N_s": C1}
+
+    def fitted(name, label):
+        variant = next(v for v in by_name[name].variants if v.label == label)
+        start = {p.name: p.starts[0] if p.starts else 1e-3 for p in variant.parameters}
+        return variant, fit(experiment, (variant,), base | start, rows, white)
+
+    others = [
+        ("elastic_moment_of_largest_angle", "largest angle, 5 coefficients"),
+        ("odd_moment_of_angle", "angle, 9 coefficients"),
+        ("dissipative_moment_of_angle", "angle, 5 coefficients"),
+    ]
+    for other in others:
+        assert fitted(*other)[1].rms(rows) > 1.5 * NOISE, other
+    name = "odd_moment_of_angle_and_largest_angle"
+    label = "relative angle, 5 coefficients, powers 1"
+    variant, found = fitted(name, label)
+    assert found.rms(rows) < 1.1 * NOISE and found.rms(holdout) < 1.1 * NOISE
+    term = Discovered("two", by_name[name], variant, found.values, pd.DataFrame(), "")
+    (tmp_path / "two.py").write_text(effect_file(term, "made up"))
+    assert_same_moments(tmp_path / "two.py", variant, found.values)
+
+
+@pytest.mark.slow
+def test_a_term_over_two_variables_is_discovered(tmp_path):
+    """With both its variables, its table over them, and a picture of it."""
+    out = tmp_path / "out"
+    measurement = read_measurement(write(tmp_path / "set", 0.0, below=0.02))
+    report = diagnose([measurement], out).report
+    (term,) = report["discovered"]
+    assert report["verdict"] == "effect_discovered"
+    assert term["depends_on"] == ["angle", "largest_angle"]
+    assert report["error"]["after"]["holdout"] < 1.25 * NOISE
+    table = pd.read_csv(out / "discovered_1.csv")
+    assert list(table.columns)[:2] == ["shear_angle_rad", "angle_over_largest"]
+    assert (out / "picture_frame_discovered_1.png").exists()
+
+
+def test_a_product_has_a_formula_of_each(tmp_path):
+    """And a shape that is none says so."""
+    x = np.linspace(0.0, 1.0, 21)
+    w, v = (grid.ravel() for grid in np.meshgrid(0.8 * x, 0.5 * x, indexing="ij"))
+    columns = {"shear_angle_rad": w, "path_rad": v}
+    products = pd.DataFrame(columns | {"moment_N": 3.0 * w * v**2, "std_moment_N": 1e-3})
+    assert _shortest(products) == "(0.6 shear angle/0.8 rad) × (1 (path/0.5 rad)²)"
+    mixed = pd.DataFrame(columns | {"moment_N": w * v + (w - v) ** 2, "std_moment_N": 1e-3})
+    assert _shortest(mixed) == "f(shear angle, path), no product of one of each"
+
+
+def test_numbers_of_two_variables_go_together():
+    """Coefficients for each power, constants for each or none."""
+    numbers = {"base": "odd", "variable": "path", "reach": 1.0, "coefficients": (1.0, 2.0, 3.0)}
+    two = {"also": "angle", "powers": (1, 2)}
+    with pytest.raises(ValueError, match="coefficients has 3 entries, allowed is"):
+        ShapedLaw(**numbers, **two)
+    with pytest.raises(ValueError, match="constants has 1 entries"):
+        ShapedLaw(**numbers | {"coefficients": (1.0, 2.0)}, **two, constants=(1.0,))
+    with pytest.raises(ValueError, match="also and powers go together"):
+        ShapedLaw(**numbers, also="angle")
+
+
+def test_a_factor_of_two_variables():
+    """Σ_p w^p (a_p + f_p(v)) with f_1 = 0.2 v, f_3 = 0.5 v, of the sign of the angle."""
+    law = ShapedLaw(
+        "odd",
+        "path",
+        reach=10.0,
+        coefficients=(2.0, 5.0),
+        also="angle",
+        also_reach=0.5,
+        powers=(1, 3),
+        constants=(0.1, 0.0),
+    )
+    w = np.minimum(np.abs(PATH) / np.float64(0.5), 1.0)
+    path = np.cumsum(np.abs(np.diff(PATH, prepend=0.0)))
+    expected = np.sign(PATH) * (w * (0.1 + 0.2 * path) + w**3 * 0.5 * path)
+    assert marched(law, PATH)[0] == pytest.approx(expected)
 
 
 def test_two_terms_of_the_travel_add(tmp_path):

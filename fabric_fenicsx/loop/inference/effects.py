@@ -29,14 +29,19 @@ class Shape:
         value: from the parameters and the variable's share of its reach, in UFL.
         fixed: numbers of the term that are not fitted, by name.
         ends: its values in the fitted readings lie between these shares of the reach.
+        also: name of another variable, likewise, which ``value`` takes a share of as well; empty
+            of a shape over one variable.
+        also_reach: its largest value.
     """
 
     x: str
     y: str
     reach: float
-    value: Callable[[Values, Any], Any]
+    value: Callable[..., Any]
     fixed: Mapping[str, Any] = field(default_factory=dict)
     ends: tuple[float, float] = (0.0, 1.0)
+    also: str = ""
+    also_reach: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +92,7 @@ class Effect:
             effect that has a name.
         depends_on: of such a term, what it is a function of.
         general_form_of: of such a term, names of listed effects that it has as a special case.
+        of_two: of such a term, whether it is looked at only where none over one variable will do.
     """
 
     name: str
@@ -97,6 +103,7 @@ class Effect:
     acts_on: str = ""
     depends_on: tuple[str, ...] = ()
     general_form_of: tuple[str, ...] = ()
+    of_two: bool = False
 
     @property
     def listed(self) -> bool:

@@ -54,6 +54,7 @@ def diagnose_test(
     """
     listed = [e for e in experiment.effects if names is None or e.name in names]
     search = _Search(experiment, listed, progress)
+    terms = [term for term in experiment.terms if not term.of_two]
     if names is not None or not experiment.terms:
         return search.run()
     further = _Search(experiment, [*listed, *experiment.terms], progress, most=1)
@@ -70,7 +71,7 @@ def diagnose_test(
         return _beside(further.run(), found)
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
-        terms, least = list(experiment.terms), -CRITERIA.decisive
+        least = -CRITERIA.decisive
     elif search.doubtful_noise or (experiment.terms_are_rivals and found.effects):
         # Before noise is said to be more than was stated, or as slow as a misfit, terms are tried.
         own = [effect.name for effect in found.effects]
@@ -117,7 +118,9 @@ class _Search:
         most: int | None = None,
     ) -> None:
         self.experiment, self.progress = experiment, progress
-        self.effects, self.most = list(effects), most
+        self.effects, self.most = [e for e in effects if not e.of_two], most
+        #: Terms over two variables, which are for where no single effect or other term will do.
+        self._of_two = [e for e in effects if e.of_two]
         # With what has no formula there are too many to fit them all.
         self._screened_first = any(not effect.listed for effect in effects)
         self.models = Models(experiment, effects)
@@ -275,10 +278,34 @@ class _Search:
         # Sizes of fits that allow for specimens and of those that do not are not compared.
         singles = self.models.weighed(found) + self.models.weighed(alike)
         levels.append(self.models.best_refined(singles))
+        best = _nearest(levels)
+        settled = self.judge.settled(best, levels[0][0]) and not self.judge.doubtful_noise(best)
+        if self._of_two and not settled:
+            of_two = self._over_two_variables(candidates)
+            levels[1] = sorted([*levels[1], *of_two], key=lambda m: m.criterion)
         for candidate in candidates:
             mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
             candidate.fit = mine[0].fit if mine else None
         return candidates, levels
+
+    def _over_two_variables(self, candidates: list[Candidate]) -> list[Model]:
+        """Models of the most promising terms over two variables, which join the candidates."""
+        base, variances = self.models.base, self.models.variances
+        expected, _ = self.experiment.predict((), base.values)
+        signs = {
+            effect: {v: signatures(self.experiment, base, expected, v) for v in effect.variants}
+            for effect in self._of_two
+        }
+        linear = ToFirstOrder(self.experiment, base, variances, CRITERIA.far)
+        screen = Screen(base, linear, signs)
+        tried = screen.most_promising(CRITERIA.products)
+        scores = screen.scores(tried)
+        candidates += [Candidate(e, *score) for e, score in zip(tried, scores, strict=True)]
+        found: list[Fit] = []
+        for effect in tried:
+            own = [((v, s),) for v, shapes in signs[effect].items() for s in shapes]
+            found += self.models.fitted(own, starts=1)
+        return self.models.best_refined(self.models.weighed(found))
 
     def _screened(self) -> Screen:
         """All effects to first order about the baseline, with the variances as they are now."""

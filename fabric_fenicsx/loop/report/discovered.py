@@ -23,6 +23,8 @@ Array = npt.NDArray[np.float64]
 
 #: Points of a shape that is shown.
 POINTS = 101
+#: ... of which one over two variables has every so many.
+STEP = 5
 #: A formula may be off by this many standard errors of the shape, or by this share of its range.
 SIGMAS, SHARE = 2.0, 0.03
 
@@ -35,7 +37,7 @@ class Discovered:
         name: discovered_1, ..., the strongest first.
         effect, variant: the term and its form.
         values: of all parameters of the model.
-        table: the variable, the shape and its standard error (``std_...``), with units.
+        table: the variable or both, the shape and its standard error (``std_...``), with units.
         formula: the shortest one that is near the shape.
     """
 
@@ -80,21 +82,21 @@ def _shape_table(d: Diagnosis, variant: Variant) -> pd.DataFrame:
     """A term's shape over its variable, as far as that was reached."""
     shape = variant.shape
     assert shape is not None
-    symbols = {p.name: symbol() for p in variant.parameters} | {"x": symbol()}
-    value = shape.value(symbols, symbols["x"])
+    x = np.linspace(*shape.ends, POINTS)
+    at = {"x": x}
+    columns = {shape.x: shape.reach * x}
+    if shape.also:
+        x, w = (grid.ravel() for grid in np.meshgrid(x[::STEP], x[::STEP]))
+        at = {"x": x, "w": w}
+        columns = {shape.also: shape.also_reach * w, shape.x: shape.reach * x}
+    symbols = {p.name: symbol() for p in variant.parameters} | {name: symbol() for name in at}
+    value = shape.value(symbols, *(symbols[name] for name in at))
     by = [p.name for p in variant.parameters]
     evaluate = numpy_function([value, *(derivative_of(value, symbols[n]) for n in by)], symbols)
-    x = np.linspace(*shape.ends, POINTS)
-    values, *slopes = evaluate({n: d.final.values[n] for n in by} | {"x": x})
+    values, *slopes = evaluate({n: d.final.values[n] for n in by} | at)
     full = {n: np.broadcast_to(s, x.shape) for n, s in zip(by, slopes, strict=True)}
-    std = d.final.error_of(full)
-    return pd.DataFrame(
-        {
-            shape.x: shape.reach * x,
-            shape.y: np.broadcast_to(values, x.shape),
-            f"std_{shape.y}": std,
-        }
-    )
+    columns[shape.y] = np.broadcast_to(values, x.shape)
+    return pd.DataFrame(columns | {f"std_{shape.y}": d.final.error_of(full)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,11 +149,15 @@ def _formulas(v: str, unit: str, reach: float) -> Iterator[_Formula]:
     yield _Formula(
         lambda x, a, b, n: a * np.sin(2.0 * np.pi * n * x) + b * (np.cos(2.0 * np.pi * n * x) - 1),
         tuple((1.0, 0.1, n) for n in np.arange(1.0, 16.0, 0.25)),
-        lambda a, b, n: (
-            f"{np.hypot(a, b):.3g} sin(2π {v}/{at(1.0 / n)} + {np.arctan2(b, a):.2g}) − "
-            f"{np.hypot(a, b) * np.sin(np.arctan2(b, a)):.2g}"
-        ),
+        lambda a, b, n: _wave(np.hypot(a, b), f"{v}/{at(1.0 / n)}", np.arctan2(b, a)),
     )
+
+
+def _wave(size: float, turns: str, phase: float) -> str:
+    """A sine, less what it is where the variable is nothing."""
+    added = (phase, -size * np.sin(phase))
+    ahead, start = (f"{'−' if n < 0.0 else '+'} {abs(n):.2g}" for n in added)
+    return f"{size:.3g} sin(2π {turns} {ahead}) {start}"
 
 
 def _bump(place: str, width: str, at_zero: float) -> str:
@@ -160,15 +166,47 @@ def _bump(place: str, width: str, at_zero: float) -> str:
     return f"({text} − {at_zero:.2g})" if at_zero > SHARE else text
 
 
+def _named(column: str) -> tuple[str, str]:
+    """A variable's name in words, and its unit."""
+    unit = parameter_unit(column)
+    name = column.removesuffix("_" + unit.replace("/", "_").replace("²", "2")) if unit else column
+    return name.replace("_rad", "").replace("_", " "), unit
+
+
+def _separated(table: pd.DataFrame) -> str:
+    """The formula of a shape over two variables: a product, if it is near one.
+
+    The nearest product of a function of each is the first part of the table's singular value
+    decomposition.
+    """
+    *variables, y, std = table.columns
+    other, first = (_named(str(column))[0] for column in variables)
+    grid, band = (table.pivot(index=variables[0], columns=variables[1], values=c) for c in (y, std))
+    left, sizes, right = np.linalg.svd(grid.to_numpy())
+    off = np.abs(grid.to_numpy() - sizes[0] * np.outer(left[:, 0], right[0]))
+    allowed = np.maximum(SIGMAS * band.to_numpy(), SHARE * float(np.ptp(grid.to_numpy())))
+    if (off > allowed).any():
+        return f"f({other}, {first}), no product of one of each"
+    # Each is 1 where it is largest; the size goes to the first.
+    parts = [left[:, 0], right[0]]
+    tops = [part[np.argmax(np.abs(part))] for part in parts]
+    size = sizes[0] * tops[0] * tops[1]
+    words = []
+    for part, top, axis, amount in zip(
+        parts, tops, (grid.index, grid.columns), (size, 1.0), strict=True
+    ):
+        one = pd.DataFrame({str(axis.name): axis, "y": amount * part / top})
+        words.append(_shortest(one.assign(std=0.0)))
+    return " × ".join(words)
+
+
 def _shortest(table: pd.DataFrame) -> str:
     """The formula of fewest numbers that is near a shape; that it has none where there is none."""
+    if len(table.columns) > 3:
+        return _separated(table)
     name, own, std = (table[c].to_numpy() for c in table.columns)
     reach = float(np.abs(name).max())
-    unit = parameter_unit(str(table.columns[0]))
-    v = str(table.columns[0])
-    if unit:
-        v = v.removesuffix("_" + unit.replace("/", "_").replace("²", "2"))
-    v = v.replace("_rad", "").replace("_", " ")
+    v, unit = _named(str(table.columns[0]))
     x = name / reach
     size = float(np.ptp(own)) or 1.0
     allowed = np.maximum(SIGMAS * std, SHARE * size)

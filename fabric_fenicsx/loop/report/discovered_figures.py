@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -18,6 +19,9 @@ __all__ = ["discovered_figure"]
 
 Array = npt.NDArray[np.float64]
 
+#: Values of the other variable that a shape over two is drawn at.
+LEVELS = 4
+
 
 def discovered_figure(diagnosis: Diagnosis, term: Discovered) -> Figure:
     """The residual against the variable found and its nearest rival's, the shape, what remains.
@@ -27,7 +31,7 @@ def discovered_figure(diagnosis: Diagnosis, term: Discovered) -> Figure:
         term: one of its discovered terms.
     """
     d, table = diagnosis, term.table
-    x, y, std = table.columns
+    x, y = table.columns[-3:-1]
     rival = _nearest_rival(d, term)
     figure = blank(5.6)
     panels = figure.subplots(2, 2)
@@ -43,16 +47,32 @@ def discovered_figure(diagnosis: Diagnosis, term: Discovered) -> Figure:
         _residual(d, panels[0, 1], d.baseline, other, f"before, against that of {name}")
         panels[0, 1].set_xlabel(variant.shape.x)
     axes = panels[1, 0]
-    band = 2.0 * table[std]
-    axes.fill_between(table[x], table[y] - band, table[y] + band, color=FAINT)
-    axes.plot(table[x], table[y], color=AFTER)
+    title = "its shape, ± 2 standard errors"
+    if len(table.columns) > 3:
+        other = table.columns[0]
+        levels = np.unique(table[other])[:: len(np.unique(table[other])) // LEVELS][1:]
+        for level in levels:
+            one = table[table[other] == level]
+            _band(axes, one, f" {level:.2g}")
+        title += f", at each {other}"
+        axes.margins(x=0.1)
+    else:
+        _band(axes, table)
     axes.set_xlabel(x)
     axes.set_ylabel(y)
-    axes.set_title("its shape, ± 2 standard errors", loc="left", fontsize=9)
+    axes.set_title(title, loc="left", fontsize=9)
     _residual(d, panels[1, 1], d.final, along, "after")
     panels[1, 1].set_xlabel(x)
     legend(figure, [panels[0, 0]])
     return figure
+
+
+def _band(axes: Axes, table: pd.DataFrame, label: str = "") -> None:
+    """A shape over its last variable with its band, and a word at its end."""
+    x, y, std = (table[column] for column in table.columns[-3:])
+    axes.fill_between(x, y - 2.0 * std, y + 2.0 * std, color=FAINT)
+    axes.plot(x, y, color=AFTER)
+    axes.annotate(label, (x.iloc[-1], y.iloc[-1]), fontsize=7, va="center")
 
 
 def _nearest_rival(d: Diagnosis, term: Discovered) -> tuple[str, Variant, Fit] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 from typing import Any, Literal, Self
@@ -12,12 +12,13 @@ from ufl import conditional, cos, exp, ge, gt, ln, lt, max_value, min_value, sin
 from ...inputs.groups import NotNegative, Positive
 from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, size_of
 
-__all__ = ["VARIABLES", "ShapedLaw", "shape_of"]
+__all__ = ["VARIABLES", "ShapedLaw", "product_of", "shape_of"]
 
 Variable = Literal[
     "angle",
     "rate",
     "largest_angle",
+    "relative_angle",
     "path",
     "time",
     "unloading",
@@ -25,6 +26,7 @@ Variable = Literal[
     "recent_largest_angle",
     "recent_rate",
 ]
+AtHand = Literal["angle", "rate"]
 Kind = Literal["spline", "graded", "step", "saturation", "logarithm"]
 Base = Literal[
     "elastic",
@@ -39,6 +41,12 @@ Base = Literal[
 ]
 
 
+def _each(at: Crossing, numbers: Sequence[Any]) -> list[Any]:
+    """Constants of the form, one for each of some numbers."""
+    known = at.number(tuple(numbers)) if numbers else ()
+    return [known[k] for k in range(len(numbers))]
+
+
 def _fading(at: Crossing, memory: Any) -> Any:
     """What is left of a memory after the step, exp(−Δt/τ)."""
     return exp(-1 / (at.per_time * memory))
@@ -48,6 +56,11 @@ def _recent(at: Crossing, x: Any, past: Any, memory: Any) -> Any:
     """Mean of x over the last τ, the latest counting most: τ ds/dt = x − s."""
     kept = _fading(at, memory)
     return kept * past + (1 - kept) * x
+
+
+def _relative(at: Crossing, largest: Any) -> Any:
+    """|γ| over its largest value so far."""
+    return at.size / max_value(largest, LEAST)
 
 
 def _unloading(at: Crossing, past: Any) -> Any:
@@ -60,6 +73,7 @@ VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
     "angle": lambda at, past, memory: at.size,
     "rate": lambda at, past, memory: size_of(at.rate),
     "largest_angle": lambda at, past, memory: max_value(past, at.size),
+    "relative_angle": lambda at, past, memory: _relative(at, max_value(past, at.size)),
     "path": lambda at, past, memory: past + size_of(at.change),
     "time": lambda at, past, memory: past + 1 / at.per_time,
     "unloading": lambda at, past, memory: _unloading(at, past),
@@ -69,7 +83,8 @@ VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
 }
 """What a factor may depend on, from the crossing, its value at the step before, and τ [s].
 
-Angles in rad, the path Σ|Δγ|, the time since the beginning [s]; all but the first two remember.
+Angles in rad, |γ| over its largest value so far, the path Σ|Δγ|, the time since the beginning [s];
+all but the first two remember.
 """
 
 FRICTION = ("dissipative", "smooth")
@@ -80,6 +95,9 @@ GRADED = (0.05, 0.1, 0.2, 0.4)
 
 OF_ELASTIC = ("elastic", "rest")
 """Bases made of the spring's moment, whose numbers are no moments per area."""
+
+LEAST = 1e-6
+"""Largest angle below which none is relative to it [rad]."""
 
 AT_HAND = ("angle", "rate")
 """Variables that do not remember."""
@@ -130,12 +148,44 @@ def shape_of(
     return value
 
 
+def product_of(
+    kind: str,
+    coefficients: Any,
+    x: Any,
+    w: Any,
+    powers: Sequence[float],
+    constants: Any = (),
+    place: Any = 0.5,
+    width: Any = 0.1,
+) -> Any:
+    """A function of two variables, Σ_p w^p (a_p + f_p(x)), w not negative.
+
+    Args:
+        kind: of all f_p; see ``shape_of``, as of what follows.
+        coefficients: of the f_p, those of the first power first, as many of each.
+        x: the first variable.
+        w: the other one.
+        powers: p.
+        constants: a_p; none are all nothing.
+        place: x₀ of all f_p.
+        width: likewise, of all f_p.
+    """
+    each = len(coefficients) // len(powers)
+    value = 0
+    for k, power in enumerate(powers):
+        own = shape_of(kind, coefficients[k * each : (k + 1) * each], x, place, width)
+        own = own + constants[k] if len(constants) else own
+        value = value + (own * w**power if power else own)
+    return value
+
+
 @dataclass(frozen=True)
 class ShapedLaw(CrossingLaw):
     """M = base · (c₀ + f(v/v_max)): a factor f of something at the crossing, no formula presumed.
 
     f is 0 at 0 (see ``shape_of``), and beyond v_max what it is there: nobody has seen more. Where
-    c₀ + f is negative the crossing gives energy away; it is to be had from measurements.
+    c₀ + f is negative the crossing gives energy away; it is to be had from measurements. Of two
+    variables f is Σ_p (w/w_max)^p (a_p + f_p(v/v_max)), see ``product_of``.
 
     Attributes:
         base: of what it is a factor: "elastic" k₁ γ + k₃ γ³, "viscous" γ̇, "dissipative" a friction
@@ -153,6 +203,13 @@ class ShapedLaw(CrossingLaw):
         k1, k3: of the elastic moment [N mm].
         stick_angle: of a friction [rad].
         memory: τ of a variable that forgets [s].
+        also: w, another variable that f depends on, if it does.
+        also_reach: w_max [rad or rad/s].
+        powers: p; ``coefficients`` has those of f_p for each in turn.
+        constants: a_p, in the unit of the coefficients; none are all nothing.
+
+    Raises:
+        ValueError: the numbers of coefficients, powers and constants do not go together.
     """
 
     base: Base = number("base", "of what it is a factor", Base)
@@ -167,8 +224,27 @@ class ShapedLaw(CrossingLaw):
     k3: Any = per_area("k3_N_mm", "cubic part of the elastic base", NotNegative, 0.0)
     stick_angle: Any = in_degrees("stick_angle_deg", "of a friction", default=0.5)
     memory: Any = number("memory_s", "of a variable that forgets", default=1.0)
+    also: AtHand | None = number("also", "another variable of the factor", AtHand | None, None)
+    also_reach: Any = number("also_reach", "its largest value that was seen", default=1.0)
+    powers: Any = number("powers", "of it, each with coefficients", list[NotNegative], [])
+    constants: Any = number("constants", "of the factor, for each power", list[float], [])
 
     law = "shaped"
+
+    def __post_init__(self) -> None:
+        """Compare numbers of coefficients."""
+        if (self.also is None) != (not self.powers):
+            raise ValueError("also and powers go together")
+        if self.powers and len(self.coefficients) % len(self.powers):
+            raise ValueError(
+                f"coefficients has {len(self.coefficients)} entries, allowed is a multiple of the "
+                f"{len(self.powers)} powers"
+            )
+        if len(self.constants) not in (0, len(self.powers)):
+            raise ValueError(
+                f"constants has {len(self.constants)} entries, allowed is none or one for each of "
+                f"the {len(self.powers)} powers"
+            )
 
     @classmethod
     def of_case(cls, values: Mapping[str, Any], area: float) -> Self:
@@ -176,21 +252,34 @@ class ShapedLaw(CrossingLaw):
         law = super().of_case(values, area)
         if law.base in OF_ELASTIC:
             return law
-        scaled = tuple(c * area for c in law.coefficients)
-        return replace(law, coefficients=scaled, constant=law.constant * area)
+        coefficients, constants = (
+            tuple(c * area for c in numbers) for numbers in (law.coefficients, law.constants)
+        )
+        return replace(
+            law, constant=law.constant * area, coefficients=coefficients, constants=constants
+        )
 
     def variable_at(self, at: Crossing) -> Any:
         """V at the end of the step."""
         past = None if self.variable in AT_HAND else at.past("variable")
         return VARIABLES[self.variable](at, past, at.number(self.memory))
 
+    def _remembered(self, at: Crossing) -> Any:
+        if self.variable == "relative_angle":
+            return max_value(at.past("variable"), at.size)
+        return self.variable_at(at)
+
     def factor(self, at: Crossing) -> Any:
         """c₀ + f at the end of the step."""
         x = min_value(self.variable_at(at) / at.number(self.reach), 1)
-        coefficients = at.number(tuple(self.coefficients))
-        parts = [coefficients[k] for k in range(len(self.coefficients))]
+        parts, constants = (_each(at, numbers) for numbers in (self.coefficients, self.constants))
         place, width = (at.number(n) for n in (self.place, self.width))
-        return at.number(self.constant) + shape_of(self.shape, parts, x, place, width)
+        constant = at.number(self.constant)
+        if self.also is None:
+            return constant + shape_of(self.shape, parts, x, place, width)
+        w = min_value(VARIABLES[self.also](at, None, None) / at.number(self.also_reach), 1)
+        powers = tuple(self.powers)
+        return constant + product_of(self.shape, parts, x, w, powers, constants, place, width)
 
     def moment(self, at: Crossing) -> Any:
         """The base times the factor, or what a shifted state of rest changes."""
@@ -205,7 +294,7 @@ class ShapedLaw(CrossingLaw):
         Of a friction its moment over its limit, of a state of rest the largest angle so far and
         its sign.
         """
-        history = {} if self.variable in AT_HAND else {"variable": self.variable_at(at)}
+        history = {} if self.variable in AT_HAND else {"variable": self._remembered(at)}
         if self.base == "rest":
             history |= {"largest": max_value(at.past("largest"), at.size), "side": self._side(at)}
         if self.base in FRICTION:

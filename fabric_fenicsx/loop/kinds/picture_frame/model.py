@@ -29,6 +29,7 @@ from ..crosshead import CrossheadTest
 from ..records import shifted
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
+from .products import products
 from .terms import terms
 
 __all__ = ["PictureFrame"]
@@ -73,7 +74,10 @@ class PictureFrame(CrossheadTest):
     @cached_property
     def terms(self) -> list[Effect]:
         """Terms without a formula over what the fitted readings reached, if more than curves."""
-        return [] if self.curves_only else terms(self._ranges(), self._ends())
+        if self.curves_only:
+            return []
+        ranges = self._ranges()
+        return [*terms(ranges, self._ends()), *products(ranges)]
 
     @property
     def one_curve(self) -> OneCurve | None:

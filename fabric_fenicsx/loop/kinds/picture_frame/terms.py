@@ -19,7 +19,18 @@ from ....mechanics.laws.shaped import GRADED, OF_ELASTIC, ShapedLaw, shape_of
 from ...inference.effects import Effect, Shape, Values, valued
 from .variant import FrameVariant
 
-__all__ = ["terms"]
+__all__ = [
+    "FORGETFUL",
+    "MEMORIES",
+    "STICKS",
+    "X",
+    "Y",
+    "of_a_law",
+    "ranges_of",
+    "reported",
+    "shapes",
+    "terms",
+]
 
 #: Numbers of coefficients of a spline; the last one of what a place may have to itself.
 SPLINES = (1, 2, 3, 5, 9)
@@ -58,10 +69,16 @@ def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> lis
             change, "force_rate" [N/s].
         ends: of those that may be negative.
     """
+    largest = ranges_of(ranges)
+    return [*_of_the_crossing(largest), *_of_the_rig(largest, ends)]
+
+
+def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
+    """Largest sizes of all variables of terms, from those that ``terms`` is given."""
     largest = dict(ranges)
     largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
-    largest |= {name: ranges["angle"] for name in ("recent_angle", "recent_largest_angle")}
-    return [*_of_the_crossing(largest), *_of_the_rig(largest, ends)]
+    largest["relative_angle"] = 1.0
+    return largest | {name: ranges["angle"] for name in ("recent_angle", "recent_largest_angle")}
 
 
 def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
@@ -79,16 +96,16 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
     for base, variables in bases.items():
         groups: dict[str, list[str]] = {}
         for variable in variables:
-            groups.setdefault(_reported(variable), []).append(variable)
-        for reported, own in groups.items():
-            name = f"{base}_moment_of_{reported}"
+            groups.setdefault(reported(variable), []).append(variable)
+        for by, own in groups.items():
+            name = f"{base}_moment_of_{by}"
             alike = ("dissipative", "smooth") if base == "dissipative" else (base,)
             forms = [f for b in alike for v in own for f in _laws(name, b, v, largest)]
-            depends_on, words = (reported, *also.get(base, ())), base.replace("_", " ")
+            depends_on, words = (by, *also.get(base, ())), base.replace("_", " ")
             yield Effect(
                 name,
                 "picture_frame",
-                f"{ABOUT.get(base, f'{words} moment')}, by {reported.replace('_', ' ')}",
+                f"{ABOUT.get(base, f'{words} moment')}, by {by.replace('_', ' ')}",
                 tuple(forms),
                 # A weave's law is odd.
                 of_fabric=not base.startswith("even"),
@@ -100,6 +117,7 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
 X = {
     "angle": "shear_angle_rad",
     "largest_angle": "largest_angle_rad",
+    "relative_angle": "angle_over_largest",
     "recent_angle": "recent_angle_rad",
     "recent_largest_angle": "recent_largest_angle_rad",
     "path": "path_rad",
@@ -129,10 +147,13 @@ ABOUT = {"rest": "state of rest of the elastic moment"}
 """What a base is called where it is no moment."""
 
 
-def _reported(variable: str) -> str:
+CALLED = {"unloading": "direction", "relative_angle": "largest_angle"}
+
+
+def reported(variable: str) -> str:
     """What a variable is called in a report."""
-    if variable == "unloading":
-        return "direction"
+    if variable in CALLED:
+        return CALLED[variable]
     return "history" if variable in FORGETFUL else variable
 
 
@@ -149,7 +170,7 @@ def _laws(
         fixed["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-4, 0.3)
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
     of_baseline = ("k1_N", "k3_N") if base in OF_ELASTIC else ()
-    for label, coefficients, numbers in _shapes(name, _wealth(base, variable)):
+    for label, coefficients, numbers in shapes(name, _wealth(base, variable)):
         own = fixed | numbers
         parameters = [*coefficients, *(n for n in own.values() if isinstance(n, Parameter))]
         own["coefficients"] = coefficients
@@ -159,7 +180,7 @@ def _laws(
             shape=Shape(
                 X[variable], Y.get(base, "moment_N"), largest[variable], partial(_factor, own), own
             ),
-            laws=partial(_law, own),
+            laws=partial(of_a_law, own),
             of_baseline=of_baseline,
         )
 
@@ -172,7 +193,8 @@ def _factor(numbers: Mapping[str, Any], values: Values, x: Any) -> Any:
     return own.get("constant", 0.0) + shape_of(*shape, x, **at)
 
 
-def _law(numbers: Mapping[str, Any], values: Values) -> tuple[ShapedLaw, ...]:
+def of_a_law(numbers: Mapping[str, Any], values: Values) -> tuple[ShapedLaw, ...]:
+    """The law of a term's numbers, some of them parameters."""
     own = {key: valued(n, values) for key, n in numbers.items()}
     if own["base"] in OF_ELASTIC:
         own |= {"k1": values["k1_N"], "k3": values["k3_N"]}
@@ -188,7 +210,7 @@ def _wealth(base: str, variable: str) -> int:
     return 3 if variable in FORGETFUL else 4
 
 
-def _shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
+def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
     """Shapes over one variable: label, coefficients, other numbers of the shape.
 
     Args:
@@ -310,7 +332,7 @@ def _added(name: str, variable: str, turning: bool) -> Iterator[tuple[str, dict[
         if name.startswith("travel"):
             return
     constant = {"constant": Parameter(f"{name}_0", amplitude=True)} if turning else {}
-    for label, coefficients, numbers in _shapes(name, _wealth(name.partition("_")[0], variable)):
+    for label, coefficients, numbers in shapes(name, _wealth(name.partition("_")[0], variable)):
         yield label, numbers | {"coefficients": coefficients} | constant
     if variable in ("time", "displacement") and not turning:
         waves = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))

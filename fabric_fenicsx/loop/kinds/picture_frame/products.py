@@ -1,0 +1,149 @@
+"""Terms without a formula over two variables together: moments by an angle or rate and a history.
+
+Of w, which is at hand at a crossing, each has a few powers, of v a shape, see product_of:
+
+    base · Σ_p (w/w_max)^p (a_p + f_p(v/v_max))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from ....inputs.parameters import Parameter
+from ....mechanics.laws.shaped import product_of
+from ...inference.effects import Effect, Shape, Values, valued
+from .terms import FORGETFUL, MEMORIES, STICKS, X, Y, of_a_law, ranges_of, reported, shapes
+from .variant import FrameVariant
+
+__all__ = ["products"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """Products with one base and one w.
+
+    Attributes:
+        base: see ShapedLaw.
+        also: w.
+        powers: p, in one form or another.
+        by: v.
+        wealth: how many shapes of v, see ``shapes``.
+        constants: whether there are a_p.
+        depends_on: what a report says beside v and w.
+    """
+
+    base: str
+    also: str
+    powers: tuple[tuple[int, ...], ...]
+    by: tuple[str, ...]
+    wealth: int = 3
+    constants: bool = False
+    depends_on: tuple[str, ...] = ()
+
+
+HISTORIES = ("largest_angle", "path", "time")
+
+BY = (*HISTORIES, "relative_angle", "rate", "unloading", *FORGETFUL)
+
+KINDS = (
+    _Kind("odd", "angle", ((1,), (1, 3), (1, 2, 3)), BY, 4),
+    _Kind("odd_in_rate", "angle", ((0, 1), (0, 1, 2)), ("rate",)),
+    _Kind("viscous", "angle", ((0, 1),), HISTORIES, 2, True, ("rate",)),
+    _Kind("dissipative", "angle", ((0, 1),), HISTORIES, 2, True, ("direction",)),
+)
+"""Of an elastic law, whatever its shape, what rises or falls with something else; of a flow by its
+rate, a dashpot and a friction that depend on the angle, likewise."""
+
+
+def products(ranges: Mapping[str, float]) -> list[Effect]:
+    """The terms of a picture frame over two variables.
+
+    Args:
+        ranges: see terms.
+    """
+    largest = ranges_of(ranges)
+    found = []
+    for kind in KINDS:
+        groups: dict[str, list[str]] = {}
+        for variable in kind.by:
+            groups.setdefault(reported(variable), []).append(variable)
+        for by, variables in groups.items():
+            name = f"{kind.base}_moment_of_{kind.also}_and_{by}"
+            forms = [form for v in variables for form in _forms(kind, name, v, largest)]
+            words = f"{kind.base} moment, by {kind.also} and {by} together"
+            found.append(
+                Effect(
+                    name,
+                    "picture_frame",
+                    words.replace("_", " "),
+                    tuple(forms),
+                    acts_on="moment",
+                    depends_on=(kind.also, by, *kind.depends_on),
+                    of_two=True,
+                )
+            )
+    return found
+
+
+def _forms(
+    kind: _Kind, name: str, variable: str, largest: Mapping[str, float]
+) -> Iterator[FrameVariant]:
+    for powers in kind.powers:
+        fixed: dict[str, Any] = {"base": kind.base, "variable": variable}
+        fixed |= {"reach": largest[variable], "also": kind.also, "powers": powers}
+        fixed["also_reach"] = largest[kind.also]
+        if variable in FORGETFUL:
+            full = largest["time"]
+            starts = tuple(share * full for share in MEMORIES)
+            fixed["memory"] = Parameter(f"{name}_memory_s", starts, starts[0] / 10.0, full)
+        if kind.base == "dissipative":
+            fixed["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-4, 0.3)
+        if kind.constants:
+            # A dashpot that depends on nothing is in the baseline.
+            own = [
+                Parameter(f"{name}_{p}_0", amplitude=True) if p or kind.base != "viscous" else 0.0
+                for p in powers
+            ]
+            fixed["constants"] = tuple(own)
+        for label, numbers in _shapes(name, kind, variable, powers):
+            yield _form(f"{label}, powers {', '.join(map(str, powers))}", fixed | numbers)
+
+
+def _shapes(
+    name: str, kind: _Kind, variable: str, powers: Sequence[int]
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Label and numbers of f_p: as many coefficients of each, places and widths in common."""
+    wealth = 1 if variable == "unloading" else 2 if variable in FORGETFUL else kind.wealth
+    for label, one, numbers in shapes(name, wealth):
+        coefficients = tuple(
+            Parameter(f"{name}_{p}_{k + 1}", amplitude=True)
+            for p in powers
+            for k in range(len(one))
+        )
+        yield f"{variable.replace('_', ' ')}, {label}", numbers | {"coefficients": coefficients}
+
+
+def _form(label: str, own: dict[str, Any]) -> FrameVariant:
+    shape = Shape(
+        X[own["variable"]],
+        Y.get(own["base"], "moment_N"),
+        own["reach"],
+        partial(_factor, own),
+        own,
+        also=X[own["also"]],
+        also_reach=own["also_reach"],
+    )
+    numbers = [*own["coefficients"], *own.get("constants", ()), *own.values()]
+    parameters = [n for n in numbers if isinstance(n, Parameter)]
+    ordered = tuple(sorted(parameters, key=lambda p: not p.amplitude))
+    return FrameVariant(label, ordered, shape=shape, laws=partial(of_a_law, own))
+
+
+def _factor(numbers: Mapping[str, Any], values: Values, x: Any, w: Any) -> Any:
+    """A law's factor at shares x and w of what was reached."""
+    own = {key: valued(n, values) for key, n in numbers.items()}
+    more = {key: own[key] for key in ("constants", "place", "width") if key in own}
+    return product_of(own["shape"], own["coefficients"], x, w, own["powers"], **more)
