@@ -208,28 +208,40 @@ def of_models(
     held = [run["label"] or run["file"] for run in runs if run["role"] == "holdout"]
     what = f"held out ({', '.join(held)})" if held else report["holdout_source"]
     places = ", ".join(f"{t:g}" for t in TRAVELS)
-    columns = ["model", "fitted, rms [N]", "each left out [N]", "weight", f"{what} [N]"]
+    # Of one strip parts are left out, which tell nothing of other strips.
+    several = sum(run["role"] == "fit" for run in runs) > 1
+    columns = ["model", "fitted, rms [N]"]
+    columns += ["each left out [N]", "weight"] if several else []
+    columns += [f"{what} [N]"]
     columns += [f"{SIZE[1]:g} x {SIZE[0]:g} mm: angle [°] at {places} mm"] if curves else []
     yield cells(*columns)
     for model in tried:
         shown = [angles(curves[model.key])] if model.key in curves else []
-        told = model.fit, model.left_out, f"{model.weight:.2f}", model.holdout
-        yield cells(model.name + ending(model), *told, *shown)
+        others = (model.left_out, f"{model.weight:.2f}") if several else ()
+        yield cells(model.name + ending(model), model.fit, *others, model.holdout, *shown)
     best = report["best"] or report["model"]
     if best["effects"]:
         names = " + ".join(f"`{e['name']}` ({e['variant']})" for e in best["effects"])
         shown = [angles(curves["nearest"])] if "nearest" in curves else []
-        yield cells(f"**{names}**", best["error_fit"], "", "", best["error_holdout"], *shown)
+        others = ("", "") if several else ()
+        yield cells(f"**{names}**", best["error_fit"], *others, best["error_holdout"], *shown)
 
 
-def foretelling(alone: Sequence[Tried], joined: Sequence[Tried]) -> str:
+def foretelling(
+    alone: Sequence[Tried], joined: Sequence[Tried], notes: Sequence[str]
+) -> Iterator[str]:
     """How well strips are foretold by strips alone and with the frames' locking, in words."""
     left_out, held = (
         [min(getattr(m, name) for m in models) for models in (alone, joined)]
         for name in ("left_out", "holdout")
     )
     better = left_out[1] < left_out[0] and held[1] < held[0]
-    return FORETELL.format(*left_out, *held, BETTER if better else NO_BETTER)
+    yield FORETELL.format(*left_out, *held)
+    yield BETTER if better else NO_BETTER
+    bounded = sum(FURTHEST in note for note in notes)
+    if bounded:
+        yield AT_BOUND.format(bounded, len(joined), FURTHEST)
+    yield ""
 
 
 def of_joined(joined: Sequence[Tried], curves: Mapping[str, pd.DataFrame]) -> Iterator[Cells]:
@@ -471,12 +483,18 @@ fitted again; they do not go on until nothing moves, as those with picture frame
 last digits of the table are [not theirs](bias_extension.md#measured-strips)."""
 
 FORETELL = """From the others a strip is foretold to {:.2g} N at best by strips alone and to
-{:.2g} N with the frames' locking, the held-out one to {:.2g} and {:.2g} N. {}"""
+{:.2g} N with the frames' locking, the held-out one to {:.2g} and {:.2g} N."""
 
-NO_BETTER = """What the frames know of locking makes the strips no better known here, and what is
+NO_BETTER = """What the frames know of locking makes these strips no better known, and what is
 foretold with it below is no better founded than what strips alone foretell."""
 
 BETTER = """With the frames' locking strips of other lengths are better known than without."""
+
+#: Of a note on a model whose share of the locking is on its bound.
+FURTHEST = "as far as it may go"
+
+AT_BOUND = """In {} of the {} models the share of the locking is {}: strips ask for one beyond that,
+and how little it is known is in no standard error below."""
 
 MISSED = """A strip that is left out is missed by {:.0f} times what a reading scatters by at least,
 by any model of the tables: what all of them miss alike is in none of these errors."""
@@ -542,7 +560,7 @@ def main() -> None:
         text += ["## Strips and picture frames", "", f"The same strips with {titles}.", ""]
         text += [*(f"{note}\n" for note in of_frames), JOINED.format(LEFT, ROUGH), ""]
         text += table(*of_joined(joined, foretold("Strips and picture frames", out, joined)))
-        text += [foretelling(tried, joined), ""]
+        text += foretelling(tried, joined, of_frames)
     length, width = SIZE
     text += [f"## {width:g} x {length:g} mm, foretold", "", FORETOLD, "", WEIGHTS, ""]
     text += table(*large(known, together))
