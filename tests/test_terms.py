@@ -225,12 +225,13 @@ def travels(*corners):
     return gamma, FRAME * (2 * np.cos(theta) - math.sqrt(2.0))
 
 
-def write(folder, wear, permanent=0.0, guide=0.0, below=0.0):
+def write(folder, wear, permanent=0.0, guide=0.0, below=0.0, warms=0.0):
     """Two fitted runs and one held out.
 
     Of the elastic moment, wear (1 − e^(−path/0.6)) is lost, its state of rest is at
     ``permanent`` max(γ_max − 0.2, 0), and a guide rubs with ``guide`` [N] at 25 ± 8 mm. Below the
-    largest angle the moment is less by ``below`` γ_max sin²(πγ/γ_max).
+    largest angle the moment is less by ``below`` γ_max sin²(πγ/γ_max). A load cell that warms up
+    begins at ``warms`` [N], of which e^(−t/60 s) is left.
     """
     folder.mkdir(parents=True)
     rng = np.random.default_rng(5)
@@ -251,6 +252,7 @@ def write(folder, wear, permanent=0.0, guide=0.0, below=0.0):
         largest = np.maximum.accumulate(np.maximum(gamma, 1e-9))
         m = m - below * largest * np.sin(np.pi * gamma / largest) ** 2
         force = m * FABRIC**2 / (FRAME * np.sin(np.pi / 4 - gamma / 2))
+        force = force + warms * np.exp(-time / 60.0)
         force = force + guide * np.sign(np.gradient(D)) * np.exp(-(((D - 25.0) / 8.0) ** 2))
         force = force + NOISE * rng.standard_normal(len(force))
         table = np.column_stack([time, D, force])
@@ -359,6 +361,7 @@ def assert_same_moments(file, variant, values):
             "reading_of_displacement_and_direction",
             lambda x: 2.0 * np.exp(-(((x - 25.0) / 8.0) ** 2)),
         ),
+        ({"warms": 1.0}, "reading_of_time", lambda x: np.exp(-x / 60.0)),
     ],
 )
 def test_the_right_term_leaves_noise(tmp_path, put_in, term, truth):

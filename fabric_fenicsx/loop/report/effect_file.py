@@ -84,7 +84,7 @@ EFFECTS = [
 ]
 '''
 
-VALUE = "ff.shape_of(x=x, **SHAPE)"
+VALUE = "({constant!r} + ff.shape_of(x=x, **SHAPE))"
 AGAINST_THE_MOTION = """(
         ({constant!r} + ff.shape_of(x=x, **SHAPE))
         * ff.shape_of("sign", (1.0,), at["speed"], width={slow!r})
@@ -138,10 +138,12 @@ def effect_file(term: Discovered, titles: str) -> str:
         lines = "\n".join(f"    {name}={value!r}," for name, value in numbers.items())
         return (HEAD + LAW).format(numbers=lines, **words)
     numbers["kind"], variable = numbers.pop("shape"), numbers.pop("variable")
-    value, of = VALUE, [variable]
+    constant = numbers.pop("constant", 0.0)
+    value, of = VALUE.format(constant=constant), [variable]
     if "slow" in numbers:
-        motion = {name: numbers.pop(name) for name in ("constant", "slow")}
-        value, of = AGAINST_THE_MOTION.format(**motion), [variable, "speed"]
+        slow = numbers.pop("slow")
+        value = AGAINST_THE_MOTION.format(constant=constant, slow=slow)
+        of = [variable, "speed"]
     lines = "\n".join(f"    {name!r}: {value!r}," for name, value in numbers.items())
     rig = {"variable": variable, "value": value, "of": tuple(of)}
     return (HEAD + OF_THE_RIG).format(numbers=lines, **rig, **words)

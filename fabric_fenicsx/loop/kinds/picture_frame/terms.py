@@ -313,7 +313,7 @@ def _of_rig(
         also = {"variable": variable} | ({"slow": slow} if turning else {})
         yield FrameVariant(
             label,
-            tuple(parameters),
+            tuple(sorted(parameters, key=lambda p: not p.amplitude)),
             shape=Shape(X[variable], Y[acts_on], reach, value, own | also, between),
             of=of,
             added_reading=added if acts_on == "reading" else None,
@@ -331,7 +331,10 @@ def _added(name: str, variable: str, turning: bool) -> Iterator[tuple[str, dict[
         yield "sign", {"shape": "sign", "coefficients": one, "width": SLOW}
         if name.startswith("travel"):
             return
-    constant = {"constant": Parameter(f"{name}_0", amplitude=True)} if turning else {}
+    constant = {}
+    if turning or name == "reading_of_time":
+        # The zero of a load cell is not where a run begins.
+        constant = {"constant": Parameter(f"{name}_0", amplitude=True)}
     for label, coefficients, numbers in shapes(name, _wealth(name.partition("_")[0], variable)):
         yield label, numbers | {"coefficients": coefficients} | constant
     if variable in ("time", "displacement") and not turning:
@@ -339,4 +342,5 @@ def _added(name: str, variable: str, turning: bool) -> Iterator[tuple[str, dict[
         most = CYCLES[variable]
         periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
         period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
-        yield "periodic", {"shape": "periodic", "coefficients": waves, "width": period}
+        wave = {"shape": "periodic", "coefficients": waves, "width": period}
+        yield "periodic", wave | constant

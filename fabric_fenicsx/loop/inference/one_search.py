@@ -1,0 +1,335 @@
+"""One search: every candidate scored, the best fitted alone and together, one model chosen.
+
+    score      what the effect's signature takes off the sum of squares, to first order (screen)
+    fit        the whole model again, with the effect in it, specimens free to differ
+    criterion  −2 log evidence of the fitted readings (judge); holdout runs play no part in it
+
+Of the models whose criterion comes near the best one's the one of fewest effects is taken. Its
+amplitudes must be significant, stretches that are left out must be predicted better with it than
+with fewer effects, and what it leaves must be noise: else nothing is claimed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from ...errors import SolveError
+from .criteria import CRITERIA
+from .curve import Curve, smooth_curve
+from .diagnosis import Candidate, Diagnosis, Verdict
+from .effects import Effect
+from .experiment import Experiment
+from .fitting import Fit, fit
+from .judge import Model
+from .models import Models
+from .noise import quantum
+from .notes import errors_beside, noise_source, notes_of
+from .rivals import pairs_of, rivals_of
+from .screen import Screen
+from .starts import Combination, ToFirstOrder, signatures
+
+__all__ = ["Search"]
+
+
+class Search:
+    """One search, with what it carries from step to step."""
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        effects: Sequence[Effect],
+        progress: Callable[[float, str], None],
+        most: int | None = None,
+    ) -> None:
+        self.experiment, self.progress = experiment, progress
+        self.effects, self.most = [e for e in effects if not e.of_two], most
+        #: Terms over two variables, which are for where no single effect or other term will do.
+        self._of_two = [e for e in effects if e.of_two]
+        # With what has no formula there are too many to fit them all.
+        self._screened_first = any(not effect.listed for effect in effects)
+        self.models = Models(experiment, effects)
+        self.judge = self.models.judge
+        #: Whether the chosen model leaves noise in the fitted readings; holdout runs have no say.
+        self.accounted = False
+        #: How many effects it has.
+        self.effects_needed = 0
+        #: Whether noise is more than was stated for that, or slow.
+        self.doubtful_noise = False
+        #: Models of one effect, the best first.
+        self.singles: Sequence[Model] = ()
+        #: Asked, where one effect does not do, whether another search has found what does.
+        self.gives_way: Callable[[], bool] = lambda: False
+        self.gave_way = False
+        #: What was found so far.
+        self.found: Diagnosis | None = None
+        self._one_by_one: tuple[list[Candidate], list[list[Model]]] | None = None
+
+    # Search -------------------------------------------------------------------------------
+
+    def run(self) -> Diagnosis:
+        """See diagnose_test."""
+        candidates, levels = self._looked_through()
+        for _ in range(CRITERIA.rounds):
+            # An outlier is seen better once the large part of the residual is gone.
+            nearest = _nearest(levels)
+            if self.gave_way or not self.judge.leave_out(nearest.fit):
+                break
+            self.models.take_noise_from(nearest.fit)
+            self._one_by_one = None
+            candidates, levels = self._looked_through()
+        baseline = levels[0][0]
+        self.singles = levels[1] if len(levels) > 1 else ()
+        chosen = self._chosen(levels)
+        verdict = self._verdict(baseline, chosen)
+        self.accounted = self.judge.accounts(chosen, baseline)
+        self.effects_needed = len(chosen.effects)
+        self.doubtful_noise = self.judge.doubtful_noise(chosen)
+        nearest = _nearest(levels)
+        final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
+        if final.effects:
+            final = self.models.last(final)
+        self.progress(0.9, "rivals")
+        judged = final if verdict != "unexplained" else nearest
+        misfit = self.judge.misfit(judged)
+        curve = self._curve(judged) if verdict == "unexplained" else None
+        of_the_curve = self._of_the_curve(levels) if curve is not None else ()
+        most = CRITERIA.terms if self._screened_first else len(self.effects)
+        rivals = rivals_of(self.models, self._screened, final, levels, most)
+        for candidate in candidates:
+            if candidate.fit is not None:
+                # Those far behind have not got their own noise and scatter yet.
+                model = self.models.refined(self.judge.weighed(candidate.fit, (candidate.effect,)))
+                candidate.fit, candidate.criterion = model.fit, model.criterion
+                candidate.holdout = self.judge.holdout(candidate.fit)
+        self.found = Diagnosis(
+            experiment=self.experiment,
+            verdict=verdict,
+            noise=misfit.noise,
+            noise_source=noise_source(self.judge, misfit.reading),
+            noise_model=judged.estimate.variances.noise,
+            quantum=quantum(self.experiment.readings, self.judge.rows),
+            baseline=baseline.fit,
+            final=final.fit,
+            best=nearest.fit if verdict == "unexplained" and nearest.effects else None,
+            effects=self.models.by_strength(final),
+            rivals=rivals,
+            pairs=pairs_of(self.models, final, rivals, of_the_curve),
+            candidates=candidates,
+            holdout_before=self.judge.holdout(baseline.fit),
+            holdout_after=self.judge.holdout(final.fit),
+            holdout_best=self.judge.holdout(nearest.fit),
+            holdout_expected=self.judge.expected_holdout(final.fit, misfit.noise),
+            holdout_source=self.judge.source,
+            white_before=self.judge.misfit(baseline).whiteness,
+            white_after=self.judge.misfit(final).whiteness,
+            outliers=self.judge.outliers,
+            criterion_before=baseline.criterion,
+            criterion_after=final.criterion,
+            curve=curve,
+            of_the_curve=of_the_curve,
+            others=errors_beside(self.judge, baseline.fit, final.fit, nearest.fit, misfit.noise),
+            laboratories=tuple(self.judge.laboratories(judged.fit, misfit.noise)),
+            notes=[*self.experiment.notes, *notes_of(self.judge, final.fit, baseline.fit)],
+        )
+        return self.found
+
+    def finds_what_several_do_not(self) -> bool:
+        """Whether a single term leaves noise, where effects with names leave far more together."""
+        if self.found is None:
+            self.run()
+        found = self.found
+        assert found is not None
+        if found.verdict != "effect_discovered" or len(found.effects) != 1:
+            return False
+        base, variances = self.models.base, found.final.variances
+        linear = ToFirstOrder(self.experiment, base, variances, None)
+        listed = {e: forms for e, forms in self._signatures.items() if e.listed}
+        left = Screen(base, linear, listed).least_left(CRITERIA.most_effects)
+        return left > CRITERIA.hopeless**2 * float(base.used.sum())
+
+    def _looked_through(self) -> tuple[list[Candidate], list[list[Model]]]:
+        """Candidates by themselves, and models by their number of effects, the best first."""
+        if self._one_by_one is None:
+            self._one_by_one = self._alone()
+        candidates, few = self._one_by_one
+        levels = [list(level) for level in few]
+        most = min(CRITERIA.most_effects, max(2, len(self.experiment.effects) // 2))
+        if self._screened_first:
+            most = self.most or CRITERIA.most_terms
+        for count in range(2, 1 + min(most, len(self.effects))):
+            best = _nearest(levels)
+            if not levels[-1] or self.judge.settled(best, levels[0][0]):
+                break
+            if count == 2:
+                self.gave_way = self.gives_way()
+                if self.gave_way:
+                    break
+            self.progress(0.5 + 0.15 * (count - 2), f"fit {count} effects together")
+            # With noise as the best model leaves it.
+            self.models.take_noise_from(best.fit)
+            self.models.base = self.models.baseline(self.models.base.values)
+            fewer = self.models.with_these_variances(levels[-1][0])
+            levels.append(self._together(count, fewer))
+            self._with_one_less(levels)
+        return candidates, [level for level in levels if level]
+
+    def _alone(self) -> tuple[list[Candidate], list[list[Model]]]:
+        """Candidates by themselves, and models of no effect and of one."""
+        self.progress(0.0, "signatures")
+        base = self.models.baseline(self.models.start)
+        expected, _ = self.experiment.predict((), base.values)
+        signs = {
+            effect: {v: signatures(self.experiment, base, expected, v) for v in effect.variants}
+            for effect in self.effects
+        }
+        self.models.base, self._signatures, self.models.forms = base, signs, {}
+        screen = self._screened()
+        levels = [[self.models.refined(self.judge.weighed(base, ()))]]
+        if not self.effects:
+            return [], levels
+        candidates = [
+            Candidate(effect, *result)
+            for effect, result in zip(self.effects, screen.scores(self.effects), strict=True)
+        ]
+        found: list[Fit] = []
+        alike: list[Fit] = []
+        tried = screen.most_promising(CRITERIA.terms) if self._screened_first else self.effects
+        for k, effect in enumerate(tried):
+            self.progress(0.1 + 0.4 * k / len(tried), f"fit {effect.name}")
+            own = [((v, s),) for v, shapes in signs[effect].items() for s in shapes]
+            found += self.models.fitted(own, starts=2)
+            alike += self.models.with_alike_specimens(own)
+        # Sizes of fits that allow for specimens and of those that do not are not compared.
+        singles = self.models.weighed(found) + self.models.weighed(alike)
+        levels.append(self.models.best_refined(singles))
+        best = _nearest(levels)
+        settled = self.judge.settled(best, levels[0][0]) and not self.judge.doubtful_noise(best)
+        if self._of_two and not settled:
+            of_two = self._over_two_variables(candidates)
+            levels[1] = sorted([*levels[1], *of_two], key=lambda m: m.criterion)
+        for candidate in candidates:
+            mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
+            candidate.fit = mine[0].fit if mine else None
+        return candidates, levels
+
+    def _over_two_variables(self, candidates: list[Candidate]) -> list[Model]:
+        """Models of the most promising terms over two variables, which join the candidates."""
+        base, variances = self.models.base, self.models.variances
+        expected, _ = self.experiment.predict((), base.values)
+        signs = {
+            effect: {v: signatures(self.experiment, base, expected, v) for v in effect.variants}
+            for effect in self._of_two
+        }
+        linear = ToFirstOrder(self.experiment, base, variances, CRITERIA.far)
+        screen = Screen(base, linear, signs)
+        tried = screen.most_promising(CRITERIA.products)
+        scores = screen.scores(tried)
+        candidates += [Candidate(e, *score) for e, score in zip(tried, scores, strict=True)]
+        found: list[Fit] = []
+        for effect in tried:
+            own = [((v, s),) for v, shapes in signs[effect].items() for s in shapes]
+            found += self.models.fitted(own, starts=1)
+        return self.models.best_refined(self.models.weighed(found))
+
+    def _screened(self) -> Screen:
+        """All effects to first order about the baseline, with the variances as they are now."""
+        base, variances = self.models.base, self.models.variances
+        linear = ToFirstOrder(self.experiment, base, variances, CRITERIA.far)
+        return Screen(base, linear, self._signatures)
+
+    def _added_to(self, model: Fit) -> list[Combination]:
+        """Every form of every other effect beside those of a model, about that model.
+
+        Where a model is far from linear, what lacks beside it is not seen about the baseline.
+        """
+        present, known = self.models.effects_of(model), set(model.values)
+        alike, _ = self.experiment.predict(model.variants, model.values)
+        return [
+            ((variant, shape),)
+            for effect in self.effects
+            if effect not in present
+            for variant in effect.variants
+            if known.isdisjoint(p.name for p in variant.parameters)
+            for shape in signatures(self.experiment, model, alike, variant)
+        ]
+
+    def _together(self, count: int, fewer: Fit) -> list[Model]:
+        """Models of several effects, the best first.
+
+        Args:
+            count: of effects.
+            fewer: the best model of one effect less.
+        """
+        combinations = self._screened().best(CRITERIA.combinations, count)
+        fits = self.models.fitted(combinations, starts=1)
+        most = CRITERIA.terms if self._screened_first else None
+        fits += self.models.fitted(self._added_to(fewer), starts=1, base=fewer, most=most)
+        return self.models.best_refined(self.models.weighed(fits))
+
+    def _with_one_less(self, levels: list[list[Model]]) -> None:
+        """The best model of the last level without each of its effects, among those before it.
+
+        Together with others an effect may have come out in a form that was not tried alone.
+        """
+        if not levels[-1]:
+            return
+        best, variances = levels[-1][0].fit, self.models.variances
+        found = []
+        for out in best.variants:
+            kept = tuple(v for v in best.variants if v is not out)
+            try:
+                found.append(fit(self.experiment, kept, best.values, best.used, variances))
+            except SolveError:
+                continue
+        tried = {m.fit.variants for m in levels[-2]}
+        new = [f for f in found if f.variants not in tried]
+        levels[-2] = self.models.best_refined([*levels[-2], *self.models.weighed(new)])
+
+    # Choice -------------------------------------------------------------------------------
+
+    def _chosen(self, levels: Sequence[Sequence[Model]]) -> Model:
+        """The model of fewest effects that no other beats decisively, if it bears scrutiny."""
+        for count, level in enumerate(levels):
+            more = [m.criterion for other in levels[count + 1 :] for m in other]
+            beaten = min(more, default=float("inf")) < level[0].criterion - CRITERIA.decisive
+            # What is left may be due to the form of an effect rather than to another one.
+            if beaten and not (count and self.judge.enough(level[0], levels[0][0])):
+                continue
+            model = level[0]
+            fewer = levels[count - 1][0] if count else None
+            while fewer is not None and not (
+                self.judge.significant(model) and self.judge.improves(model, fewer)
+            ):
+                count -= 1
+                model = levels[count][0]
+                fewer = levels[count - 1][0] if count else None
+            return model
+        return levels[-1][0]
+
+    def _verdict(self, baseline: Model, chosen: Model) -> Verdict:
+        if not chosen.effects:
+            return "no_effect" if self.judge.explains(baseline, baseline) else "unexplained"
+        if self.experiment.curves_only:
+            # Every effect can be such curves: none is told from the others.
+            return "unexplained"
+        if not self.judge.explains(chosen, baseline):
+            return "unexplained"
+        return "effect_found" if all(e.listed for e in chosen.effects) else "effect_discovered"
+
+    def _curve(self, model: Model) -> Curve | None:
+        known = self.experiment.one_curve
+        if known is None:
+            return None
+        readings, rows = self.experiment.readings, model.fit.used
+        return smooth_curve(known, readings, rows, model.estimate.variances, self.judge.given)
+
+    def _of_the_curve(self, levels: Sequence[Sequence[Model]]) -> tuple[str, ...]:
+        """Effects that come as near to the curve as the nearest of them."""
+        singles = levels[1] if len(levels) > 1 else []
+        limit = min((m.criterion for m in singles), default=0.0) + CRITERIA.decisive
+        return tuple(dict.fromkeys(m.effects[0].name for m in singles if m.criterion < limit))
+
+
+def _nearest(levels: Sequence[Sequence[Model]]) -> Model:
+    """The model with the smallest criterion."""
+    return min((m for level in levels for m in level), key=lambda m: m.criterion)
