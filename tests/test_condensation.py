@@ -21,7 +21,7 @@ from fabric_fenicsx import _dolfinx
 from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.drape import DrapeCase
-from fabric_fenicsx.solving import remainder, tangent
+from fabric_fenicsx.solving import direct, remainder, tangent
 from fabric_fenicsx.solving.blocks import BLOCK
 from fabric_fenicsx.solving.discretisation import Discretisation
 from fabric_fenicsx.solving.remainder import ByFronts, ByMumps
@@ -428,3 +428,25 @@ def test_components_that_all_nodes_are_held_in_are_not_factorised(symmetric):
     nodes[3, 2] = 1.0
     K = tangent_of(system, free, symmetric=symmetric, prefix=prefix)
     assert K.unknowns == 4 * len(nodes)
+
+
+class Unfactorised:
+    """A preconditioner whose factorisation did not serve."""
+
+    def apply(self, pc, b, y):
+        direct.fail(pc)
+
+
+def test_a_factorisation_that_fails_stops_the_solver():
+    A = PETSc.Mat().createAIJ(
+        ((2, 2), (2, 2)), csr=([0, 1, 2], [0, 1], [1.0, 1.0]), comm=MPI.COMM_SELF
+    )
+    A.assemble()
+    solver = PETSc.KSP().create(MPI.COMM_SELF)
+    solver.setType("preonly")
+    solver.setOperators(A)
+    solver.getPC().setType(PETSc.PC.Type.PYTHON)
+    solver.getPC().setPythonContext(Unfactorised())
+    b, x = A.createVecs()
+    solver.solve(b, x)
+    assert solver.getConvergedReason() < 0
