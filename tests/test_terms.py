@@ -96,6 +96,7 @@ def test_memories_fade():
         ("logarithm", (0.7,), {"width": 0.05}),
         ("periodic", (0.4, -0.6), {"width": 0.3}),
         ("sign", (0.4,), {"width": 1e-3}),
+        ("sides", (0.4, -0.6), {}),
     ],
 )
 def test_shapes_begin_at_nothing_and_are_smooth(kind, coefficients, numbers):
@@ -427,7 +428,22 @@ def test_a_term_over_two_variables_is_discovered(tmp_path):
     assert (out / "picture_frame_discovered_1.png").exists()
 
 
-def test_a_product_has_a_formula_of_each(tmp_path):
+def test_each_side_of_nothing_has_a_slope_of_its_own():
+    """Where readings are on both sides; with the formula that says so."""
+    label = "each side its own"
+    both = {t.name: t for t in terms(RANGES, {"force": (-0.5, 1.0)})}
+    forms = {v.label: v for v in both["reading_of_force"].variants}
+    assert label not in {v.label for v in both["reading_of_displacement"].variants}
+    shape = forms[label].shape
+    odd, even = (p.name for p in forms[label].parameters)
+    x = np.linspace(-0.5, 1.0, 7)
+    value = [float(as_ufl(shape.value({odd: 3.0, even: 1.0}, as_ufl(float(one))))) for one in x]
+    assert value == pytest.approx(np.where(x > 0.0, 4.0 * x, 2.0 * x))
+    table = pd.DataFrame({"force_N": shape.reach * x, "reading_N": value, "std_reading_N": 1e-4})
+    assert _shortest(table) == "(0.8 force above 0, 0.4 force below)"
+
+
+def test_a_product_has_a_formula_of_each():
     """And a shape that is none says so."""
     x = np.linspace(0.0, 1.0, 21)
     w, v = (grid.ravel() for grid in np.meshgrid(0.8 * x, 0.5 * x, indexing="ij"))

@@ -117,6 +117,11 @@ def _formulas(v: str, unit: str, reach: float) -> Iterator[_Formula]:
     yield _Formula(lambda x, a: a * x, ((1.0,),), lambda a: f"{a:.3g} {v}/{at(1.0)}")
     yield _Formula(lambda x, a: a * x**2, ((1.0,),), lambda a: f"{a:.3g} ({v}/{at(1.0)})²")
     yield _Formula(
+        lambda x, a, b: a * x + b * np.abs(x),
+        ((1.0, 0.5),),
+        lambda a, b: f"{(a + b) / reach:.3g} {v} above 0, {(a - b) / reach:.3g} {v} below",
+    )
+    yield _Formula(
         lambda x, a, b: a * (1.0 - np.exp(-x / b)),
         ((1.0, 0.1), (1.0, 0.5)),
         lambda a, b: f"{a:.3g} (1 − exp(−{v}/{at(b)}))",

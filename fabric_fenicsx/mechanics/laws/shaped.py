@@ -119,7 +119,7 @@ def shape_of(
             "graded", one with the knots GRADED, for what bends at the beginning; "step",
             c / (1 + exp(−(x − x₀)/w)); "saturation", c (1 − exp(−x/w)); "logarithm",
             c ln(1 + x/w); "periodic", c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1);
-            "sign", c tanh(x/w).
+            "sign", c tanh(x/w); "sides", c₁ x + c₂ |x|, each side of 0 with a slope of its own.
         coefficients: c or c_k.
         x: where.
         place: x₀ of a step.
@@ -139,6 +139,8 @@ def shape_of(
         return c[0] * sin(turn) + c[1] * (cos(turn) - 1)
     if kind == "sign":
         return c[0] * tanh(x / width)
+    if kind == "sides":
+        return c[0] * x + c[1] * size_of(x)
     pieces = max(len(c) - 1, 1)
     low, high = ends
     even = [low + (high - low) * k / pieces for k in range(1, pieces)]

@@ -51,6 +51,7 @@ BY = (*HISTORIES, "relative_angle", "rate", "unloading", *FORGETFUL)
 KINDS = (
     _Kind("odd", "angle", ((1,), (1, 3), (1, 2, 3)), BY, 4),
     _Kind("odd_in_rate", "angle", ((0, 1), (0, 1, 2)), ("rate",)),
+    _Kind("odd_in_rate", "rate", ((1, 2),), (*HISTORIES, *FORGETFUL)),
     _Kind("viscous", "angle", ((0, 1),), HISTORIES, 2, True, ("rate",)),
     _Kind("dissipative", "angle", ((0, 1),), HISTORIES, 2, True, ("direction",)),
 )

@@ -299,7 +299,11 @@ def _of_rig(
     reach, slow = largest[variable], SLOW * largest["speed"]
     of = (variable, "speed") if turning else (variable,)
     between = ends.get(variable, (0.0, 1.0))
-    for label, own in _added(name, variable, turning):
+    shapes_of = list(_added(name, variable, turning))
+    if between[0] < 0.0 < between[1] and not turning:
+        sides = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("odd", "even"))
+        shapes_of.append(("each side its own", {"shape": "sides", "coefficients": sides}))
+    for label, own in shapes_of:
         if own["shape"] == "spline":
             own |= {"ends": between}
         value = partial(_factor, own)
