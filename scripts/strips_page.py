@@ -30,7 +30,8 @@ from fabric_fenicsx.loop.fabric import fabric_content, write_fabric
 from fabric_fenicsx.loop.inference.diagnosis import Diagnosis
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.kinds.bias_extension.frame_law import FRAME_SHARE
-from fabric_fenicsx.loop.kinds.bias_extension.with_frames import KEPT
+from fabric_fenicsx.loop.kinds.bias_extension.settling import LEFT, ROUGH
+from fabric_fenicsx.loop.kinds.bias_extension.with_frames import KEPT, weights_of
 
 Cells = tuple[str, ...]
 
@@ -51,7 +52,8 @@ class Tried:
 
     Attributes:
         left_out: error of each strip foretold from the others.
-        kept: whether that is about as small as the least.
+        weight: of it among those of its table, by that.
+        converged: whether its fits did.
         share: of the frames' locking; None without.
         forms: of the effects, in words.
     """
@@ -61,7 +63,8 @@ class Tried:
     holdout: float
     fabric: Path
     left_out: float
-    kept: bool
+    weight: float
+    converged: bool
     share: float | None = None
     forms: str = ""
 
@@ -96,16 +99,18 @@ def diagnosed(
         models += [((c.effect.name,), c.fit, c.holdout) for c in d.candidates if c.fit is not None]
         judge = Judge(d.experiment, list(d.experiment.effects))
         left_out = [judge.left_out(fit).error(d.experiment.readings.first) for _, fit, _ in models]
+        count = sum(not run.holdout for m in strips for run in m.runs)
+        weights = weights_of(np.array(left_out), count)
         every: list[Any] = [
-            ("_".join(names) or "baseline", names, fit, held, error, error <= KEPT * min(left_out))
-            for (names, fit, held), error in zip(models, left_out, strict=True)
+            ("_".join(names) or "baseline", names, fit, held, error, weight, fit.converged)
+            for (names, fit, held), error, weight in zip(models, left_out, weights, strict=True)
         ]
         for j in d.joined:
             names = tuple(e.name for e in j.effects)
             key = "_".join(["with_frames", *names])
-            every.append((key, names, j.fit, j.holdout, j.left_out, j.kept))
+            every.append((key, names, j.fit, j.holdout, j.left_out, j.weight, j.settled))
         tried = []
-        for key, names, fit, holdout, error, kept in every:
+        for key, names, fit, holdout, error, weight, converged in every:
             file = f"fabric_{key}.yaml"
             shown: Diagnosis = replace(d, best=fit, verdict="unexplained")
             write_fabric(out, fabric_content([(shown, strips)], out, nearest=True), file)
@@ -118,7 +123,8 @@ def diagnosed(
                     "holdout": holdout,
                     "file": file,
                     "left_out": error,
-                    "kept": bool(kept),
+                    "weight": float(weight),
+                    "converged": bool(converged),
                     "share": fit.values[FRAME_SHARE] if key.startswith("with") else None,
                     "forms": ", ".join(forms[1:]) if key.startswith("with") else "",
                 }
@@ -202,30 +208,57 @@ def of_models(
     held = [run["label"] or run["file"] for run in runs if run["role"] == "holdout"]
     what = f"held out ({', '.join(held)})" if held else report["holdout_source"]
     places = ", ".join(f"{t:g}" for t in TRAVELS)
-    columns = ["model", "fitted, rms [N]", "each left out [N]", f"{what} [N]"]
+    # Of one strip parts are left out, which tell nothing of other strips.
+    several = sum(run["role"] == "fit" for run in runs) > 1
+    columns = ["model", "fitted, rms [N]"]
+    columns += ["each left out [N]", "weight"] if several else []
+    columns += [f"{what} [N]"]
     columns += [f"{SIZE[1]:g} x {SIZE[0]:g} mm: angle [°] at {places} mm"] if curves else []
     yield cells(*columns)
     for model in tried:
         shown = [angles(curves[model.key])] if model.key in curves else []
-        yield cells(model.name, model.fit, model.left_out, model.holdout, *shown)
+        others = (model.left_out, f"{model.weight:.2f}") if several else ()
+        yield cells(model.name + ending(model), model.fit, *others, model.holdout, *shown)
     best = report["best"] or report["model"]
     if best["effects"]:
         names = " + ".join(f"`{e['name']}` ({e['variant']})" for e in best["effects"])
         shown = [angles(curves["nearest"])] if "nearest" in curves else []
-        yield cells(f"**{names}**", best["error_fit"], "", best["error_holdout"], *shown)
+        others = ("", "") if several else ()
+        yield cells(f"**{names}**", best["error_fit"], *others, best["error_holdout"], *shown)
+
+
+def foretelling(
+    alone: Sequence[Tried], joined: Sequence[Tried], notes: Sequence[str]
+) -> Iterator[str]:
+    """How well strips are foretold by strips alone and with the frames' locking, in words."""
+    left_out, held = (
+        [min(getattr(m, name) for m in models) for models in (alone, joined)]
+        for name in ("left_out", "holdout")
+    )
+    better = left_out[1] < left_out[0] and held[1] < held[0]
+    yield FORETELL.format(*left_out, *held)
+    yield BETTER if better else NO_BETTER
+    bounded = sum(FURTHEST in note for note in notes)
+    if bounded:
+        yield AT_BOUND.format(bounded, len(joined), FURTHEST)
+    yield ""
 
 
 def of_joined(joined: Sequence[Tried], curves: Mapping[str, pd.DataFrame]) -> Iterator[Cells]:
     """The models with the frames' locking, and the angles of the large strip with each."""
     places = ", ".join(f"{t:g}" for t in TRAVELS)
     large = f"{SIZE[1]:g} x {SIZE[0]:g} mm: angle [°] at {places} mm"
-    errors = "fitted, rms [N]", "each left out [N]", "held out [N]"
+    errors = "fitted, rms [N]", "each left out [N]", "weight", "held out [N]"
     yield cells("with the frames' locking", "share of it", *errors, large)
     for model in joined:
-        name = model.name if model.effects else "pinned"
-        told = model.share, model.fit, model.left_out, model.holdout
-        shown = angles(curves[model.key]) if model.key in curves else ""
-        yield cells(name if model.kept else f"{name}: not kept", *told, shown)
+        name = (model.name if model.effects else "pinned") + ending(model)
+        told = model.share, model.fit, model.left_out, f"{model.weight:.2f}", model.holdout
+        yield cells(name, *told, angles(curves[model.key]))
+
+
+def ending(model: Tried) -> str:
+    """What is to be said of how the fits of a model ended."""
+    return "" if model.converged else " (not converged)"
 
 
 def of_the_other(other: Any, tried: Sequence[Tried], near: Path, out: Path) -> Iterator[Cells]:
@@ -361,22 +394,27 @@ def numbers(report: dict[str, Any]) -> list[str]:
     return [f"A reading scatters by {noise:.2g} N. {parameters(report)}.", ""]
 
 
-def over_models(name: str, curves: Sequence[pd.DataFrame], own: pd.DataFrame) -> Iterator[Cells]:
-    """The large strip by all models that were kept, and how far they are apart.
+def over_models(
+    name: str, models: Sequence[Tried], curves: Mapping[str, pd.DataFrame], own: pd.DataFrame
+) -> Iterator[Cells]:
+    """The large strip by models as they weigh, and how far those are apart that weigh something.
 
     Args:
         name: of them together.
-        curves: of each.
-        own: standard errors of one of them.
+        models: of one table.
+        curves: of each, by its key.
+        own: standard errors of the one that weighs most.
     """
-    angle = np.array([at_travels(curve, "shear_angle_deg") for curve in curves])
+    weight = np.array([model.weight for model in models])
+    angle = np.array([at_travels(curves[model.key], "shear_angle_deg") for model in models])
     errors = [at_travels(own, f"shear_angle_deg_{end}") for end in ("fit", "specimens")]
-    std = np.sqrt(np.var(angle, axis=0) + np.sum(np.square(errors), axis=0))
-    mean = angle.mean(axis=0)
+    mean = weight @ angle
+    std = np.sqrt(weight @ (angle - mean) ** 2 + np.sum(np.square(errors), axis=0))
     yield cells(
         f"**{name}: angle [°]**", *(f"{a:.1f} ± {s:.1f}" for a, s in zip(mean, std, strict=True))
     )
-    span = zip(angle.min(axis=0), angle.max(axis=0), strict=True)
+    heavy = angle[weight >= KEPT * weight.max()]
+    span = zip(heavy.min(axis=0), heavy.max(axis=0), strict=True)
     yield cells(f"{name}: least and most [°]", *(f"{a:.1f} to {b:.1f}" for a, b in span))
 
 
@@ -391,9 +429,9 @@ def large(known: Mapping[str, pd.DataFrame], together: Sequence[Cells]) -> Itera
         columns = [f"shear_angle_deg{end}" for end in ("", "_fit", "_specimens")]
         every = zip(*(at_travels(curve, column) for column in columns), strict=True)
         own = (f"{a:.1f} ± {s:.1f} ± {z:.1f}" for a, s, z in every)
-        yield cells(f"{name}, least error: angle [°]", *own)
+        yield cells(f"{name}, the heaviest: angle [°]", *own)
         force = zip(*(at_travels(curve, f"force_N{end}") for end in ("", "_fit")), strict=True)
-        yield cells(f"{name}, least error: force [N]", *(f"{f:.3g} ± {s:.2g}" for f, s in force))
+        yield cells(f"{name}, the heaviest: force [N]", *(f"{f:.3g} ± {s:.2g}" for f, s in force))
 
 
 OPENING = """# Published strips, and other strips foretold
@@ -420,21 +458,51 @@ model has for a dashpot goes by the rate. At small angles it makes {:.2g} N/mm i
 fitted at the higher one foretells too little at the lower one, in the first third of the travel."""
 
 FORETOLD = """The mean angle of all crossings whose two tows end in no clamp. No model has seen
-this size, or an angle. Bold: the mean of all models of a table above that foretell a strip from the
-others with at most {:g} times the least error, each counted once, ± the standard deviation between
-them, a standard error of the fit and what specimens differ by, taken together; then their span.
-Below that the one with the least error by itself, with one standard error of the fit and with
-what specimens differ by: that it may not be the right model is in neither."""
+this size, or an angle. Bold: the mean over the models of a table above, each with its weight, ± the
+standard deviation between them so weighed, a standard error of the fit and what specimens differ
+by, taken together; then the span of those that weigh at least a tenth of what the heaviest does.
+Below that the heaviest by itself, with one standard error of the fit and with what specimens differ
+by: that it may not be the right model is in neither."""
+
+WEIGHTS = """*Weights.* What a model misses of a strip goes together along all of its readings: a
+strip is one observation, however many readings it has. Of n strips that are left out in turn, with
+a root mean square error e, the likelihood goes as e⁻ⁿ, where how far strips are off as a rule is
+known to nobody and is taken at its likeliest; that, here e⁻², is a model's weight. Likelihoods of
+single readings would give all of it to one model, and none of them leaves noise. Of two strips an
+error half as large again weighs 2.3 times less: the weights tell bad models from others, and hardly
+good ones from each other. What is held out has no say in them."""
 
 JOINED = """Locking is what exceeds the least steep piece of a frame's law. Here it is the fabric's,
-in a size within a standard deviation of the laboratories; the rest is each frame's own, and the
-strips have a law of their own at small angles. All is fitted to the strips' forces. Not kept is
-what foretells a strip from the others with more than {:g} times the least error."""
+the same in all strips, in a size within a standard deviation of the laboratories; the rest is each
+frame's own, and the strips have a law of their own at small angles. All is fitted to the strips'
+forces, each strip solved with its own parameters where a round of the fit ends, until nothing would
+move by more than {:g} of its standard error, or {:g} where slipping crossings make corners."""
+
+ALONE = """Where these fits end strips are solved once more, forces are corrected, and they are
+fitted again; they do not go on until nothing moves, as those with picture frames below do, and the
+last digits of the table are [not theirs](bias_extension.md#measured-strips)."""
+
+FORETELL = """From the others a strip is foretold to {:.2g} N at best by strips alone and to
+{:.2g} N with the frames' locking, the held-out one to {:.2g} and {:.2g} N."""
+
+NO_BETTER = """What the frames know of locking makes these strips no better known, and what is
+foretold with it below is no better founded than what strips alone foretell."""
+
+BETTER = """With the frames' locking strips of other lengths are better known than without."""
+
+#: Of a note on a model whose share of the locking is on its bound.
+FURTHEST = "as far as it may go"
+
+AT_BOUND = """In {} of the {} models the share of the locking is {}: strips ask for one beyond that,
+and how little it is known is in no standard error below."""
+
+MISSED = """A strip that is left out is missed by {:.0f} times what a reading scatters by at least,
+by any model of the tables: what all of them miss alike is in none of these errors."""
 
 SLIP = """The strip of {size} with `crossover_slip` alone, and where its crossings slipped:"""
 
-REPORTED = """Of woven strips it is reported that yarns slip above some 35 to 40 degrees, first at
-the borders of the zones."""
+REPORTED = """That yarns of woven strips slip above some 35 to 40 degrees, first at the borders of
+the zones, is commonly said; no measurement of it is cited here, and it is no check of the model."""
 
 
 def main() -> None:
@@ -454,16 +522,14 @@ def main() -> None:
     together: list[Cells] = []
 
     def foretold(name: str, out: Path, models: Sequence[Tried]) -> dict[str, pd.DataFrame]:
-        """Curves of the large strip with models; those that are kept count for its angles."""
+        """Curves of the large strip with the models of a table, which count as they weigh."""
         folders = {m.key: pulled(out / f"large_{m.key}", m.fabric, spacing) for m in models}
         curves = {key: pd.read_csv(folder / "curve.csv") for key, folder in folders.items()}
-        kept = sorted((m for m in models if m.kept), key=lambda m: m.left_out)
-        if kept:
-            folder = out / f"known_{kept[0].key}"
-            pulled(folder, kept[0].fabric, spacing, uncertainty=True)
-            known[name] = pd.read_csv(folder / "uncertainty.csv")
-            of_kept = [curves[m.key] for m in kept]
-            together.extend(over_models(name, of_kept, known[name]))
+        heaviest = max(models, key=lambda m: m.weight)
+        folder = out / f"known_{heaviest.key}"
+        pulled(folder, heaviest.fabric, spacing, uncertainty=True)
+        known[name] = pd.read_csv(folder / "uncertainty.csv")
+        together.extend(over_models(name, models, curves, known[name]))
         return curves
 
     out = arguments.out / "together"
@@ -476,7 +542,7 @@ def main() -> None:
     of_frames = [note for note in report["notes"] if note.startswith(OF_FRAMES)]
     report["notes"] = [note for note in report["notes"] if note not in of_frames]
     text += section("Strips alone", arguments.strips, report)
-    text += [*table(*of_models(report, tried, curves)), *numbers(report)]
+    text += [*table(*of_models(report, tried, curves)), *numbers(report), ALONE, ""]
     friction.append(viscous(arguments.strips, report))
     if arguments.other:
         other = ff.read_measurement(arguments.other)
@@ -492,11 +558,14 @@ def main() -> None:
     if joined:
         titles = "; ".join(ff.read_measurement(f).title for f in arguments.frames)
         text += ["## Strips and picture frames", "", f"The same strips with {titles}.", ""]
-        text += [*(f"{note}\n" for note in of_frames), JOINED.format(KEPT), ""]
+        text += [*(f"{note}\n" for note in of_frames), JOINED.format(LEFT, ROUGH), ""]
         text += table(*of_joined(joined, foretold("Strips and picture frames", out, joined)))
+        text += foretelling(tried, joined, of_frames)
     length, width = SIZE
-    text += [f"## {width:g} x {length:g} mm, foretold", "", FORETOLD.format(KEPT), ""]
+    text += [f"## {width:g} x {length:g} mm, foretold", "", FORETOLD, "", WEIGHTS, ""]
     text += table(*large(known, together))
+    missed = min(model.left_out for model in every) / report["error"]["noise"]
+    text += [MISSED.format(missed), ""]
     slipping = next(model for model in tried if model.effects == ("crossover_slip",))
     text += ["## Slip", "", SLIP.format(size=f"{width:g} x {length:g} mm"), ""]
     text += [*of_slip(slipping.fabric, out / "large_crossover_slip"), ""]

@@ -21,11 +21,11 @@ from fabric_fenicsx import _dolfinx
 from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.drape import DrapeCase
-from fabric_fenicsx.solving import remainder, tangent
+from fabric_fenicsx.solving import direct, remainder, tangent
 from fabric_fenicsx.solving.blocks import BLOCK
 from fabric_fenicsx.solving.discretisation import Discretisation
 from fabric_fenicsx.solving.remainder import ByFronts, ByMumps
-from fabric_fenicsx.solving.tangent import Condensed, Whole, tangent_of
+from fabric_fenicsx.solving.tangent import Condensed, OfComponents, Whole, tangent_of
 
 SPEC = importlib.util.spec_from_file_location(
     "network", Path(__file__).parent / "benchmarks" / "network.py"
@@ -392,3 +392,61 @@ def test_a_source_that_does_not_compile_is_none(tmp_path):
     path = tmp_path / "wrong.c"
     path.write_text("void f(int64_t n) { this is not C }")
     assert _dolfinx.compile_source(path, MPI.COMM_SELF) is None
+
+
+@KINDS
+def test_components_that_all_nodes_are_held_in_are_not_factorised(symmetric):
+    """Also where the tangent couples them to the others: what is held there does not move."""
+    system = Blocks(plain_net(3, 4, 4.0, 1), symmetric=symmetric, comm=MPI.COMM_SELF)
+    disc, prefix = system.net, PREFIX[symmetric]
+    free, b = disc.vector(), right_hand_side(disc)
+    nodes = free.array.reshape(-1, BLOCK)
+    nodes[:, [0, 1, 5]] = 1.0
+    nodes[2] = 0.0
+    found = []
+    for K in (
+        tangent_of(system, free, symmetric=symmetric, prefix=prefix),
+        Whole(system, free, symmetric, prefix),
+    ):
+        x, y = disc.vector(), disc.vector()
+        # Twice: a factorisation must not see anything of the one before it.
+        for size in (3.0, 1.0):
+            system.size = size
+            K.assemble()
+            K.factorise()
+        assert K.solve([b], [x])
+        K.mult(b, y)
+        found.append((type(K), K.unknowns, x.array_r.copy(), y.array_r.copy()))
+        K.destroy()
+    (one, unknowns, x, Ab), (other, every, whole_x, whole_Ab) = found
+    assert (one, other) == (OfComponents, Whole)
+    assert 2 * unknowns == every == len(x)
+    np.testing.assert_allclose(x, whole_x, rtol=0, atol=1e-11 * np.abs(whole_x).max())
+    np.testing.assert_array_equal(Ab, whole_Ab)
+    assert np.abs(Ab.reshape(-1, BLOCK)[:, 2:5]).max() > 1.0
+    # Free in a component at one node only, it is one to be solved for.
+    nodes[3, 2] = 1.0
+    K = tangent_of(system, free, symmetric=symmetric, prefix=prefix)
+    assert K.unknowns == 4 * len(nodes)
+
+
+class Unfactorised:
+    """A preconditioner whose factorisation did not serve."""
+
+    def apply(self, pc, b, y):
+        direct.fail(pc)
+
+
+def test_a_factorisation_that_fails_stops_the_solver():
+    A = PETSc.Mat().createAIJ(
+        ((2, 2), (2, 2)), csr=([0, 1, 2], [0, 1], [1.0, 1.0]), comm=MPI.COMM_SELF
+    )
+    A.assemble()
+    solver = PETSc.KSP().create(MPI.COMM_SELF)
+    solver.setType("preonly")
+    solver.setOperators(A)
+    solver.getPC().setType(PETSc.PC.Type.PYTHON)
+    solver.getPC().setPythonContext(Unfactorised())
+    b, x = A.createVecs()
+    solver.solve(b, x)
+    assert solver.getConvergedReason() < 0

@@ -19,6 +19,7 @@ from fabric_fenicsx.loop import workers
 from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig, strip
 from fabric_fenicsx.loop.kinds.bias_extension.strip import KNOTS, Curve, solved_strip, strip_case
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
+from fabric_fenicsx.rigs.bias_extension import build
 
 GAMMA = np.radians(KNOTS)
 SOFT, STIFF = (Curve.through(k * (0.02 * GAMMA + 0.2 * GAMMA**3)) for k in (1.0, 5.0))
@@ -63,6 +64,21 @@ def test_a_model_that_is_kept_remembers_nothing(changes):
     assert same(solved_strip(case(changes), SOFT), fresh)
     strip._strip.cache_clear()
     assert same(solved_strip(case(changes | other), STIFF), between)
+
+
+@pytest.mark.parametrize("changes", [{}, SLIPPING], ids=["pinned", "slipping"])
+def test_a_strip_stays_in_its_plane_unheld(monkeypatch, changes):
+    """Nothing pulls it out: free to leave the plane it goes the same way."""
+    strip._strip.cache_clear()
+    held = solved_strip(case(changes), SOFT)
+    monkeypatch.setattr(strip, "build", lambda case, session, plane: build(case, session))
+    strip._strip.cache_clear()
+    free = solved_strip(case(changes), SOFT)
+    strip._strip.cache_clear()
+    assert not same(held, free)
+    for name in ("travel", "force", "gamma", "middle"):
+        one, other = getattr(held, name), getattr(free, name)
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-7 * np.abs(other).max())
 
 
 def test_a_way_back_is_solved_as_such():

@@ -194,7 +194,11 @@ def slip_limit(case: BiasExtensionCase) -> float | None:
 
 
 def build(
-    case: BiasExtensionCase, session: Session, travel: Callable[[float], float] | None = None
+    case: BiasExtensionCase,
+    session: Session,
+    travel: Callable[[float], float] | None = None,
+    *,
+    plane: bool = False,
 ) -> Model:
     """The model of a strip. Collective.
 
@@ -202,13 +206,16 @@ def build(
         case: of the strip.
         session: where and how it runs.
         travel: of the crosshead [mm] at a time [s]; by default the case's.
+        plane: whether all nodes are held in the plane that nothing pulls them out of: half the
+            unknowns.
     """
     from ..solving.model import Support
     from .common import fabric_model, tow_net
 
     net = tow_net(case, fabrics(case, session.base)["strip"], session)
     lower, upper = clamps(net, case)
-    every = (0, 1, 2, 3, 4, 5)
+    free = np.setdiff1d(np.arange(len(net.points)), np.concatenate([lower, upper]))
+    every, out_of_plane = (0, 1, 2, 3, 4, 5), (2, 3, 4)
 
     def pulled(time: float) -> Array:
         place = crosshead(case, time) if travel is None else travel(time)
@@ -223,7 +230,11 @@ def build(
         session,
         viscosity=case.tow.relaxation_time_s,
         gravity=(0.0, -case.gravity_mm_s2, 0.0),
-        supports=[Support(lower, every), Support(upper, every, pulled)],
+        supports=[
+            Support(lower, every),
+            Support(upper, every, pulled),
+            *([Support(free, out_of_plane)] if plane else []),
+        ],
         interlacing=shares,
         patch=shares,
     )

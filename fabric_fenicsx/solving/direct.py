@@ -17,6 +17,9 @@ __all__ = ["blas", "destroy", "fail", "give_back", "ordering", "petsc", "solved"
 
 Array = npt.NDArray[np.float64]
 
+#: PC_FACTOR_OTHER of PETSc's petscpctypes.h, which not all versions of petsc4py have a name for.
+FACTOR_OTHER = 4
+
 
 def solver(comm: MPI.Comm, prefix: str, symmetric: bool, **more: Any) -> PETSc.KSP:
     """MUMPS, unless PETSc's options say otherwise."""
@@ -103,8 +106,7 @@ def petsc() -> ctypes.CDLL:
 
 def fail(pc: PETSc.PC) -> None:
     """Make a solver with a preconditioner of type python stop as after a failed factorisation."""
-    reason = ctypes.c_int(int(PETSc.PC.FailedReason.OTHER))
-    petsc().PCSetFailedReason(ctypes.c_void_p(pc.handle), reason)
+    petsc().PCSetFailedReason(ctypes.c_void_p(pc.handle), ctypes.c_int(FACTOR_OTHER))
 
 
 def blas(name: str) -> int | None:

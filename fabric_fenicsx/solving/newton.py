@@ -21,7 +21,7 @@ from .._dolfinx import NOT_A_NUMBER
 from ..errors import SolveError
 from .pressed import Dyad, DyadicLU
 from .system import System
-from .tangent import Condensed, Whole, tangent_of
+from .tangent import Tangent, Whole, tangent_of
 
 __all__ = ["Newton", "Outcome"]
 
@@ -110,7 +110,7 @@ class Newton:
         self._refused = self._unsettled = ""
         self._symmetric = False
         self._solvers: dict[bool, PETSc.SNES] = {}
-        self._tangents: dict[bool, Whole | Condensed] = {}
+        self._tangents: dict[bool, Tangent] = {}
 
     @property
     def snes(self) -> PETSc.SNES:
@@ -144,7 +144,7 @@ class Newton:
         snes.setConvergenceTest(self._test)
         snes.setFromOptions()
         snes.setTolerances(max_it=self.limit)
-        if self._dyads or isinstance(tangent, Condensed):
+        if self._dyads or not isinstance(tangent, Whole):
             pc = snes.getKSP().getPC()
             pc.setType(PETSc.PC.Type.PYTHON)
             pc.setPythonContext(DyadicLU(tangent, self._free_dyads))

@@ -27,7 +27,7 @@ from ..mechanics.fields import TowFields
 from ..mechanics.terms import side_by_side
 from .direct import fail
 from .discretisation import Discretisation
-from .tangent import Condensed, Whole
+from .tangent import Tangent
 
 __all__ = ["Dyad", "DyadicLU", "PressedTool"]
 
@@ -174,7 +174,7 @@ class DyadicLU:
         dyads: gives (c, r, s) of each, c already zero in rows whose increment is prescribed.
     """
 
-    def __init__(self, tangent: Whole | Condensed, dyads: Callable[[], list[Dyad]]) -> None:
+    def __init__(self, tangent: Tangent, dyads: Callable[[], list[Dyad]]) -> None:
         self._tangent, self._dyads = tangent, dyads
         self._new: list[Dyad] = []
         self._solved: list[Dyad] = []

@@ -2,7 +2,8 @@
 
 Prescribed rows have one on the diagonal and their columns are gone, so that a symmetric tangent
 stays symmetric; ``mult`` has them. Either the matrix is factorised as it is, or, where tows have
-enough nodes between crossings for that to pay, without these.
+enough nodes between crossings for that to pay, without these, or, where all nodes are held in some
+components, as out of a plane, without those.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from .discretisation import Discretisation
 from .remainder import ByFronts, ByMumps, Left
 from .system import System
 
-__all__ = ["Condensed", "Whole", "tangent_of"]
+__all__ = ["Condensed", "OfComponents", "Tangent", "Whole", "tangent_of"]
 
 Array = npt.NDArray[np.float64]
 
@@ -40,9 +41,7 @@ LEAST = 100
 AGAIN = 20
 
 
-def tangent_of(
-    system: System, free: PETSc.Vec, *, symmetric: bool, prefix: str
-) -> Whole | Condensed:
+def tangent_of(system: System, free: PETSc.Vec, *, symmetric: bool, prefix: str) -> Tangent:
     """The tangent of a system, condensed where that pays and can be done. Collective.
 
     The PETSc option ``condense``, after the prefix, decides otherwise.
@@ -62,6 +61,9 @@ def tangent_of(
             return Condensed(system, free, symmetric, prefix, functions)
         if disc.comm.rank == 0:
             _say_once("no C compiler: tangents are factorised whole, at about twice the cost")
+    components = free.array_r.reshape(-1, BLOCK).any(axis=0).sum()
+    if disc.comm.size == 1 and 0 < components < BLOCK:
+        return OfComponents(system, free, symmetric, prefix)
     return Whole(system, free, symmetric, prefix)
 
 
@@ -122,6 +124,83 @@ class Whole:
     def destroy(self) -> None:
         """Give back the matrices and the factorisation. Collective."""
         destroy(self._solver, self._A, self.matrix)
+
+
+class OfComponents:
+    """The tangent of a system on one rank, without components that all of its nodes are held in.
+
+    Of a sheet that stays in a plane three of six are left.
+
+    Attributes:
+        matrix: stands for the tangent in PETSc's solvers; it has no entries.
+        unknowns: how many the factorised matrix has.
+    """
+
+    def __init__(self, system: System, free: PETSc.Vec, symmetric: bool, prefix: str) -> None:
+        net = system.net
+        own = free.array_r.reshape(-1, BLOCK)
+        components = np.flatnonzero(own.any(axis=0))
+        self._system = system
+        self._kept = (np.arange(len(own))[:, None] * BLOCK + components).ravel()
+        # Of the entries of a stored block, by columns.
+        self._inside = (components[:, None] * BLOCK + components).ravel()
+        shape = (net.owned * BLOCK,) * 2
+        self.matrix = PETSc.Mat().createAIJ((shape, shape), nnz=0, comm=net.comm)
+        self.matrix.assemble()
+        self._A = net.own_matrix(symmetric=symmetric)
+        # A matrix has its pattern once it has been filled.
+        system.tangent(self._A)
+        starts, columns = self._A.getRowIJ(False, True)
+        create = PETSc.Mat().createSBAIJ if symmetric else PETSc.Mat().createBAIJ
+        size = len(components)
+        pattern = starts, columns, np.zeros((len(columns), size, size))
+        self._P = create((len(self._kept),) * 2, size, csr=pattern, comm=net.comm)
+        self._P.assemble()
+        self.unknowns = len(self._kept)
+        self._free = self._P.createVecRight()
+        self._free.array[:] = free.array_r[self._kept]
+        # A row of PETSc's triples for each.
+        self._held = np.flatnonzero(self._free.array_r == 0.0).astype(PETSc.IntType)[:, None]
+        self._new_solver = lambda: solver(net.comm, prefix, symmetric, **ordering(net.comm))
+        self._solver = self._new_solver()
+
+    def assemble(self) -> None:
+        """Assemble the tangent at the increment and section forces set last."""
+        self._system.tangent(self._A)
+        self.matrix.stateIncrease()
+
+    def mult(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Y = A x."""
+        self._A.mult(x, y)
+
+    def factorise(self) -> None:
+        """Factorise the tangent as it was assembled last."""
+        P, rows = self._P, self._held
+        blocks = _stored_blocks(self._A).reshape(-1, BLOCK * BLOCK)
+        _stored_blocks(P)[:] = blocks[:, self._inside].ravel()
+        P.diagonalScale(self._free, self._free)
+        if len(rows):
+            P.setValuesRCV(rows, rows, np.ones(rows.shape))
+        P.assemble()
+        self._solver.setOperators(P)
+        self._solver.setUp()
+
+    def solve(self, rights: Sequence[PETSc.Vec], solutions: Sequence[PETSc.Vec]) -> bool:
+        """Solve by the last factorisation, together; whether it served."""
+        found = solved(self._solver, [b.array_r[self._kept] for b in rights])
+        if found is None:
+            # PETSc does not get over every error of a factor.
+            self._solver.destroy()
+            self._solver = self._new_solver()
+            return False
+        for b, y, values in zip(rights, solutions, found, strict=True):
+            y.array[:] = b.array_r
+            y.array[self._kept] = values
+        return True
+
+    def destroy(self) -> None:
+        """Give back the matrices and the factorisation."""
+        destroy(self._solver, self._A, self._P, self.matrix)
 
 
 class Condensed:
@@ -313,6 +392,9 @@ def _stored_blocks(A: PETSc.Mat) -> npt.NDArray[np.float64]:
     get = getattr(petsc(), f"MatSeq{kind}GetArray")
     get(ctypes.c_void_p(A.handle), ctypes.byref(values))
     return np.ctypeslib.as_array(values, (int(A.getInfo()["nz_used"]),))
+
+
+Tangent = Whole | OfComponents | Condensed
 
 
 @cache

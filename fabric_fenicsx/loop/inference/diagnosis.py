@@ -16,7 +16,7 @@ from .fitting import Fit
 from .judge import Laboratory
 from .noise import Noise, Whiteness
 
-__all__ = ["Beside", "Candidate", "Diagnosis", "Joined", "Verdict"]
+__all__ = ["Beside", "Candidate", "Diagnosis", "Joined", "Round", "Verdict"]
 
 Flags = npt.NDArray[np.bool_]
 Pair = tuple[str, list[Fit], str, list[Fit]]
@@ -40,6 +40,25 @@ class Beside:
     noise: float
 
 
+@dataclass(frozen=True, slots=True)
+class Round:
+    """A place that a fit came to, of a model that is solved there.
+
+    Attributes:
+        values: of the parameters.
+        objective: −2 log of the largest likelihood that is foretold about it, that of the place
+            itself where nothing is left to go; of a fit with variances that are given, the sum of
+            squares there.
+        left: standard errors that are left to go, of the combination that has furthest to go.
+        middle: of strips, the angle of the middle at the last fitted reading of each run [degrees].
+    """
+
+    values: Mapping[str, float]
+    objective: float
+    left: float
+    middle: Mapping[str, float]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Joined:
     """A model with something in it that another test of the fabric found.
@@ -49,8 +68,10 @@ class Joined:
         fit: the model.
         left_out: error of each run foretold from the others, or of parts of a single one.
         holdout: error of holdout runs; NaN without.
-        kept: whether it is among those that foretell about as well as the best one.
-        middle: of strips, the angle of the middle at the last fitted reading of each run [degrees].
+        kept: whether it weighs enough for its fabric to be of use.
+        weight: how likely it is beside the others, by what it foretells; they sum to one.
+        rounds: of its fit.
+        settled: whether that and the fits without each run have converged.
     """
 
     effects: tuple[Effect, ...]
@@ -58,7 +79,14 @@ class Joined:
     left_out: float
     holdout: float
     kept: bool
-    middle: Mapping[str, float]
+    weight: float
+    rounds: tuple[Round, ...]
+    settled: bool
+
+    @property
+    def middle(self) -> Mapping[str, float]:
+        """Of strips, the angle of the middle where the fitted readings of each run end."""
+        return self.rounds[-1].middle
 
 
 @dataclass(slots=True)

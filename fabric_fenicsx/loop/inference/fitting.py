@@ -141,12 +141,12 @@ class Fit:
         columns = [np.broadcast_to(slopes.get(name, 0.0), count) for name in self.values]
         J = np.column_stack(columns)
         known = self.root[: len(self.values)]
-        return np.asarray(np.linalg.norm(J @ known, axis=1) * self._misfit)
+        return np.asarray(np.linalg.norm(J @ known, axis=1) * self.misfit)
 
     @property
     def errors(self) -> dict[str, float]:
         """Standard errors, for what is left where that is more than the noise."""
-        return {name: std * self._misfit for name, std in self.std.items()}
+        return {name: std * self.misfit for name, std in self.std.items()}
 
     def wald(self, names: Sequence[str], known: Sequence[str]) -> float:
         """Wald's statistic of some parameters: square of their distance from nothing, in errors.
@@ -163,7 +163,7 @@ class Fit:
         own, found, errors = left[known_at_all], found[known_at_all], errors[known_at_all]
         # Smallest combination of the independent ones that takes them there: zero where none does.
         least = np.linalg.lstsq(own / errors[:, None], found / errors, rcond=1e-8)[0]
-        return float(least @ least) / self._misfit**2
+        return float(least @ least) / self.misfit**2
 
     def _root_given(self, known: Sequence[str]) -> Array:
         """What known parameters leave of the independent combinations; see root."""
@@ -171,7 +171,8 @@ class Fit:
         return self.root - self.root @ np.linalg.pinv(given) @ given if len(given) else self.root
 
     @property
-    def _misfit(self) -> float:
+    def misfit(self) -> float:
+        """What is left over what the noise allows for, 1 at least: standard errors grow by it."""
         return max(1.0, float(np.sqrt(self.sum_of_squares / self.freedom)))
 
 

@@ -129,7 +129,14 @@ def test_report(
     if d.joined:
         content["joined"] = [
             _numbers(d, m.fit, m.holdout)
-            | {"error_left_out": m.left_out, "kept": m.kept, "middle_angle_deg": dict(m.middle)}
+            | {
+                "error_left_out": m.left_out,
+                "kept": m.kept,
+                "weight": m.weight,
+                "settled": m.settled,
+                "middle_angle_deg": dict(m.middle),
+                "rounds": [asdict(one) for one in m.rounds],
+            }
             for m in d.joined
         ]
     if d.others:

@@ -166,7 +166,7 @@ class SolvedStrips:
         paths: dict[tuple[str, Curve], StripPath],
     ) -> None:
         self._runs, self._furthest, self._strips = list(runs), furthest, (furthest, speed, back)
-        self._groups: list[npt.NDArray[np.int64]] | None = None
+        self._groups: dict[int, npt.NDArray[np.int64]] = {}
         self._known: dict[str, list[Solved]] = {}
         self.paths = paths
         self.failed: dict[str, str] = {}
@@ -204,16 +204,51 @@ class SolvedStrips:
         Returns:
             Of each that is wanted the set, or why one of its strips stopped before its end.
         """
+        runs = range(len(self._runs))
+        every = iter(self._paths([(r, *one) for one in wanted for r in runs], steps))
+        found = []
+        for changes, curve in wanted:
+            one = self._gathered(curve, [next(every) for _ in runs])
+            if isinstance(one, Solved):
+                self.count += 1
+                if steps == STEPS:
+                    self._known.setdefault(_key(changes), []).append(one)
+            found.append(one)
+        return found
+
+    def ways(self, wanted: Sequence[tuple[int, Wanted]], steps: int) -> list[Way]:
+        """Single strips, each with what it is wanted with; not kept for others near by.
+
+        Args:
+            wanted: number of the run, and its changes and curve.
+            steps: of the way, if none fails.
+
+        Raises:
+            SolveError: one of them stopped before its end.
+        """
+        found = []
+        paths = self._paths([(run, *one) for run, one in wanted], steps)
+        for (run, (_, curve)), path in zip(wanted, paths, strict=True):
+            if isinstance(path, Exception):
+                raise path
+            found.append(_way(path, self._of_alike(run, path), curve))
+        return found
+
+    def _paths(
+        self, wanted: Sequence[tuple[int, Mapping[str, Any], Curve]], steps: int
+    ) -> list[StripPath | Exception]:
+        """Of each run with its changes and curve what is known, or is solved now."""
         tasks: dict[tuple[str, Curve], tuple[Any, Curve]] = {}
         places = []
-        for changes, curve in wanted:
-            own = []
-            for (m, run), travel, pace, back in zip(self._runs, *self._strips, strict=True):
-                case = strip_case(m, run, float(travel), float(pace), changes, steps, bool(back))
-                own.append((case.model_dump_json(), curve))
-                if own[-1] not in self.paths:
-                    tasks.setdefault(own[-1], (case, curve))
-            places.append(own)
+        for run, changes, curve in wanted:
+            measurement, own = self._runs[run]
+            travel, pace, back = (of[run] for of in self._strips)
+            case = strip_case(
+                measurement, own, float(travel), float(pace), changes, steps, bool(back)
+            )
+            places.append((case.model_dump_json(), curve))
+            if places[-1] not in self.paths:
+                tasks.setdefault(places[-1], (case, curve))
         order = sorted(tasks, key=lambda key: -tasks[key][0].length_mm * tasks[key][0].width_mm)
         stopped: dict[tuple[str, Curve], Exception] = {}
         results = each_of(solved_strip, [tasks[key] for key in order])
@@ -223,15 +258,7 @@ class SolvedStrips:
             else:
                 self.paths[key] = path
                 self._no_way_back |= tasks[key][0].unload and path.back is None
-        found = []
-        for (changes, curve), own in zip(wanted, places, strict=True):
-            one = self._gathered(curve, [stopped.get(key) or self.paths[key] for key in own])
-            if isinstance(one, Solved):
-                self.count += 1
-                if steps == STEPS:
-                    self._known.setdefault(_key(changes), []).append(one)
-            found.append(one)
-        return found
+        return [stopped.get(key) or self.paths[key] for key in places]
 
     def solved(self, changes: Mapping[str, Any], curve: Curve, steps: int = STEPS) -> Solved:
         """One set of strips.
@@ -301,10 +328,12 @@ class SolvedStrips:
             if isinstance(path, Exception):
                 raise path
             whole.append(path)
-        if self._groups is None:
-            self._groups = [_alike(path) for path in whole]
-        ways = [_way(*one, curve) for one in zip(whole, self._groups, strict=True)]
+        ways = [_way(path, self._of_alike(r, path), curve) for r, path in enumerate(whole)]
         return Solved.along(curve, ways, self._furthest)
+
+    def _of_alike(self, run: int, path: StripPath) -> npt.NDArray[np.int64]:
+        """Groups of a run's crossings, the same for all of its paths."""
+        return self._groups.setdefault(run, _alike(path))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -309,7 +309,7 @@ class _Strip:
 
         session = Session(Path(), MPI.COMM_SELF, Path(), perf_counter(), laws=(law,))
         try:
-            self._model = build(case, session)
+            self._model = build(case, session, plane=True)
         except ValueError as error:
             raise InputError(f"bias_extension: {error}") from None
         disc = self._model.disc

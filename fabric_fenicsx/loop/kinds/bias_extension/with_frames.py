@@ -7,15 +7,15 @@ locking the strips are fitted anew: a law of their own, k1 γ + c1 γ̇, has the
 of the large ones, and slip and the compliance of tows are what they must be.
 
 Forces hardly tell such models apart, and what strips of one fabric differ by is more than what any
-of them leaves. So all are kept that foretell a strip from the others nearly as well as the best
-one does, and what they say differently is part of the uncertainty.
+of them leaves. So each has a weight, by how well it foretells a strip from the others, and what
+they say differently is part of the uncertainty.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import combinations, product
 
 import numpy as np
@@ -25,8 +25,9 @@ from ....errors import SolveError
 from ...inference.criteria import CRITERIA
 from ...inference.diagnosis import Diagnosis, Joined
 from ...inference.effects import Effect, Variant
-from ...inference.fitting import Fit, fit, groups_of
+from ...inference.fitting import Fit, groups_of
 from ...inference.judge import Judge
+from ...inference.starts import SMALL
 from ...inference.variances import Variances
 from ...measurement.schema import Measurement
 from ..picture_frame.model import PictureFrame
@@ -34,6 +35,7 @@ from ..picture_frame.variant import FrameVariant
 from .centred import CentredBiasExtension
 from .frame_law import FRAME_SHARE, in_thirds, locking, locking_variant
 from .model import BiasExtension
+from .settling import Settled, Settling, left_out
 from .strip import KNOTS, NOTHING, Curve
 
 __all__ = ["SharedLocking", "join", "shared_locking", "way_out"]
@@ -54,11 +56,8 @@ LEAST_SCATTER, MOST_SCATTER = 0.05, 0.95
 LITTLE = 0.1
 #: Parameter of the baseline's spring that would lock too.
 OWN_LOCKING = "k3_N"
-#: Left-out error over the least of all up to which a model is kept. Convention.
-KEPT = 1.5
-#: How often strips are solved where a fit ended; what it must have come to, over what there was,
-#: for that to be done again; evaluations of a fit; how often a way that leads nowhere is halved.
-SETTLED, ENOUGH, FAR, SHORTEST = 6, 0.95, 12, 2
+#: Weight over the largest from which on a model is kept. Convention.
+KEPT = 0.1
 #: Effects by which strips lengthen without shear.
 LENGTHENING = ("crossover_slip", "tow_uncrimping")
 
@@ -140,7 +139,8 @@ def held(known: SharedLocking) -> FrameVariant:
     """A form of that locking in a size between the laboratories'."""
     form = locking_variant(np.radians(KNOTS), known.moment)
     (share,) = form.parameters
-    own = replace(share, starts=(1.0,), lower=known.least, upper=known.most)
+    # It is never absent, and all specimens have the same: no amplitude.
+    own = replace(share, starts=(1.0,), lower=known.least, upper=known.most, amplitude=False)
     return replace(form, label="as picture frames have it", parameters=(own,))
 
 
@@ -175,7 +175,9 @@ def join(
     )
     experiment.effects = anew.effects
     alone = anew.foretold_by(Curve.through(known.moment))
-    d.joined = _weighed(anew, d, _models(anew, d, form, names))
+    judge = Judge(anew, list(anew.effects))
+    judge.outliers = d.outliers
+    d.joined = _weighed(anew, judge, _models(anew, judge, d, form, names))
     d.notes += _in_words(known, alone, d.joined)
 
 
@@ -188,44 +190,59 @@ def _with(effects: Sequence[Effect], form: FrameVariant) -> list[Effect]:
 
 
 def _models(
-    anew: BiasExtension, d: Diagnosis, form: FrameVariant, names: Sequence[str] | None
-) -> list[tuple[tuple[Effect, ...], Fit]]:
+    anew: CentredBiasExtension,
+    judge: Judge,
+    d: Diagnosis,
+    form: FrameVariant,
+    names: Sequence[str] | None,
+) -> Iterator[tuple[tuple[Effect, ...], Settled]]:
     """With none of what lets a strip lengthen without shear, with each, and with both.
 
     Of each the form that fits best; both begin where the better of them ended, with little of the
-    other one.
+    other one. Of what nothing is left in the end is no model of its own.
     """
     own = [e for e in anew.effects if e.name in LENGTHENING and (names is None or e.name in names)]
-    found: dict[tuple[Effect, ...], Fit] = {}
+    found: dict[tuple[Effect, ...], Settled] = {}
     for count in range(len(own) + 1):
         for effects in combinations(own, count):
-            singles = [found.get((e,)) for e in effects]
-            sets: list[tuple[tuple[Variant, ...], Mapping[str, float] | None]]
+            singles = [found[(e,)] for e in effects if (e,) in found]
+            sets: list[tuple[tuple[Variant, ...], Mapping[str, float] | None]] = []
             if count < 2:
-                sets = [((form, *v), None) for v in product(*(e.variants for e in effects))]
-            elif all(singles):
-                better, other = sorted(
-                    (f for f in singles if f is not None), key=lambda f: f.sum_of_squares
-                )
+                sets += [((form, *v), None) for v in product(*(e.variants for e in effects))]
+            elif len(singles) == count:
+                better, other = (one.fit for one in sorted(singles, key=_objective))
                 (little,) = other.variants[-1].parameters
                 start = {little.name: LITTLE * other.values[little.name], **better.values}
-                sets = [((*better.variants, other.variants[-1]), start)]
-            else:
-                continue
-            fits = [_fitted(anew, d, forms, start) for forms, start in sets]
-            done = [model for model in fits if model is not None]
+                sets += [((*better.variants, other.variants[-1]), start)]
+            fits = [_fitted(anew, judge, d, forms, start) for forms, start in sets]
+            done = [model for model in fits if model is not None and _of_all(model.fit)]
             if done:
-                found[effects] = min(done, key=lambda model: model.sum_of_squares)
-    return list(found.items())
+                found[effects] = min(done, key=_objective)
+    yield from found.items()
+
+
+def _of_all(model: Fit) -> bool:
+    """Whether something is left of each effect of a model."""
+    names = [p.name for v in model.variants for p in v.amplitudes]
+    return not any(n in model.at_bound and abs(model.values[n]) <= SMALL for n in names)
+
+
+def _objective(found: Settled) -> float:
+    return found.rounds[-1].objective
 
 
 def _fitted(
-    anew: BiasExtension, d: Diagnosis, forms: Sequence[Variant], start: Mapping[str, float] | None
-) -> Fit | None:
-    """A model fitted as the nearest one was; None where strips have no solution.
+    anew: CentredBiasExtension,
+    judge: Judge,
+    d: Diagnosis,
+    forms: Sequence[Variant],
+    start: Mapping[str, float] | None,
+) -> Settled | None:
+    """A model fitted; None where strips have no solution.
 
     Args:
         anew: the experiment.
+        judge: of it.
         d: what was found of the strips by themselves.
         forms: of the model.
         start: of its parameters; by default the baseline and the forms' own starts.
@@ -233,76 +250,77 @@ def _fitted(
     nearest = d.final if d.best is None else d.best
     usual = max(nearest.variances.scatter.values(), default=0.0)
     groups = groups_of(anew, forms)
-    scatter = {g: nearest.variances.scatter.get(g, usual) for g in groups if g != OWN_LOCKING}
+    scatter = {g: nearest.variances.scatter.get(g, usual) for g in groups}
     variances = Variances(nearest.variances.noise, scatter)
+    search = Settling(anew, forms, d.baseline.used, variances, judge)
     baseline = {p.name: min(d.baseline.values[p.name], p.upper) for p in anew.baseline}
-    rows = d.baseline.used
     starts = [
         baseline | {name: value for own in grid for name, value in own.items()}
         for grid in product(*(v.grid(amplitudes=True) for v in forms))
     ]
-    again = partial(fit, anew, forms, used=rows, variances=variances)
-
-    def solved(values: Mapping[str, float], deviations: Mapping[str, Array]) -> Fit:
-        """The model as it is there."""
-        anew.settle(forms, values)
-        return again(values, deviations=deviations, evaluations=1)
-
-    try:
-        tried = [solved(one, {}) for one in (starts if start is None else [start])]
-        best, converged, shorter = min(tried, key=lambda m: m.sum_of_squares), False, 0
-        anew.settle(forms, best.values)
-        there = best
-        for _ in range(SETTLED):
-            there = again(there.values, deviations=there.deviations, evaluations=FAR)
-            there = solved(*_between(best, there, 0.5**shorter))
-            if there.sum_of_squares < best.sum_of_squares:
-                converged = there.sum_of_squares > ENOUGH * best.sum_of_squares
-                best, shorter = there, 0
-            else:
-                shorter, there = shorter + 1, best
-                anew.settle(forms, best.values)
-            if converged or shorter > SHORTEST:
-                break
-    except SolveError:
-        return None
-    return replace(best, converged=converged)
-
-
-def _between(one: Fit, other: Fit, share: float) -> tuple[dict[str, float], dict[str, Array]]:
-    """Parameters and deviations so far on the way from a model to another one."""
-    values = {n: v + share * (other.values[n] - v) for n, v in one.values.items()}
-    own = one.deviations
-    nothing = np.zeros(len(one.readings.specimens))
-    deviations = {
-        g: (1.0 - share) * own.get(g, nothing) + share * d for g, d in other.deviations.items()
-    }
-    return values, deviations
+    tried = []
+    for values in starts if start is None else [start]:
+        with suppress(SolveError):
+            tried.append(search.at(values, {}, derivatives=False))
+    if tried:
+        with suppress(SolveError):
+            return search.from_there(min(tried, key=lambda model: model.sum_of_squares))
+    return None
 
 
 def _weighed(
-    anew: BiasExtension, d: Diagnosis, found: Sequence[tuple[tuple[Effect, ...], Fit]]
+    anew: CentredBiasExtension,
+    judge: Judge,
+    found: Iterable[tuple[tuple[Effect, ...], Settled]],
 ) -> list[Joined]:
     """Models with what they foretell, the best first."""
-    judge = Judge(anew, list(anew.effects))
-    judge.outliers = d.outliers
-    first = anew.readings.first
-    left_out = [judge.left_out(model).error(first) for _, model in found]
-    limit = KEPT * float(np.nanmin(left_out, initial=np.inf))
+    first, every = anew.readings.first, list(found)
+    errors, fits, sure = [], list[Fit](), []
+    for _, one in every:
+        several = len(np.unique(anew.readings.run[one.fit.used & first])) > 1
+        off, converged = left_out(anew, one.fit) if several else (np.zeros(0), True)
+        fits.append(one.search.whole(one.fit))
+        errors.append(_rms(off[first]) if several else judge.left_out(fits[-1]).error(first))
+        sure.append(converged and one.fit.converged)
+    strips = len(np.unique(anew.readings.run[judge.rows & first]))
+    weights = weights_of(np.array(errors), strips)
+    kept = weights >= KEPT * weights.max(initial=0.0)
     out = judge.held_rows & first
     models = [
-        Joined(effects, model, error, model.rms(out), error <= limit, _middle(anew, model))
-        for (effects, model), error in zip(found, left_out, strict=True)
+        Joined(
+            effects,
+            fits[k],
+            errors[k],
+            fits[k].rms(out),
+            bool(kept[k]),
+            float(weights[k]),
+            one.rounds,
+            sure[k],
+        )
+        for k, (effects, one) in enumerate(every)
     ]
     return sorted(models, key=lambda m: m.left_out)
 
 
-def _middle(anew: BiasExtension, model: Fit) -> dict[str, float]:
-    angle, readings = anew.middle_angle(model.variants, model.values), anew.readings
-    return {
-        readings.names[run]: float(angle[model.used & (readings.run == run)][-1])
-        for run in np.unique(readings.run[model.used & readings.first])
-    }
+def weights_of(errors: Array, strips: int) -> Array:
+    """How likely models are beside each other, by what they foretell of strips that are left out.
+
+    What a model misses of a strip goes together along all of its readings: a strip counts once. Of
+    n strips, foretold with a root mean square error e and with deviations that are normal in a size
+    that nobody knows, the likelihood is as e⁻ⁿ at its most.
+
+    Args:
+        errors: of each model; NaN of those that foretell nothing, (n_models,).
+        strips: how many were left out.
+    """
+    likely = (np.nanmin(errors, initial=np.inf) / errors) ** strips
+    likely = np.nan_to_num(likely)
+    return likely / max(float(likely.sum()), 1e-300)
+
+
+def _rms(off: Array) -> float:
+    found = off[np.isfinite(off)]
+    return float(np.sqrt(np.mean(found**2))) if len(found) else float("nan")
 
 
 def _in_words(
@@ -322,12 +340,12 @@ def _in_words(
         rows = model.fit.used & model.fit.readings.first
         yield (
             f"With it, {share:.2g} times{bound}, {names} leave {model.fit.rms(rows):.2g} N, and "
-            f"{model.left_out:.2g} N in strips that are left out"
-            + ("." if model.kept else ": not kept.")
+            f"{model.left_out:.2g} N in strips that are left out: its weight is {model.weight:.2f}."
+            + ("" if model.settled else " Some of its fits have not converged.")
         )
     for run in models[0].middle if models else ():
         angles = [model.middle[run] for model in models if model.kept]
         yield (
             f"Where the readings of {run} end its middle is sheared by {min(angles):.0f} to "
-            f"{max(angles):.0f}°, by the models that were kept."
+            f"{max(angles):.0f}°, by the models that weigh at least a tenth of the heaviest."
         )
