@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import numpy as np
 
 from fabric_fenicsx.inputs.parameters import Parameter
@@ -53,6 +55,7 @@ class Linear:
     test, quantity, notes, one_curve = "linear", "force_N", (), None
     curves_only = False
     alike = frozenset()
+    imitated = MappingProxyType({})
 
     def __init__(self, data, columns, baseline, *, effects=(), noise=None):
         self.readings, self.columns = data, columns

@@ -1,6 +1,7 @@
 """What a model may be believed by: noise as it was stated, held-out runs that are foretold."""
 
 import numpy as np
+import pytest
 from linear import Linear, readings
 
 from fabric_fenicsx.inputs.parameters import Parameter
@@ -8,6 +9,7 @@ from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.noise import Noise
+from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.variances import Variances
 
 #: One sigma of a reading.
@@ -57,3 +59,33 @@ def test_noise_beyond_what_was_stated():
         assert judge.doubtful_noise(model) is more
     judge, model = judged(stated=None, scatter=2.0 * SIGMA)
     assert not judge.doubtful_noise(model)
+
+
+@pytest.mark.parametrize(
+    ("truth", "sigmas", "found", "rivals"),
+    [
+        ("bend", 80.0, "bend", []),
+        ("round", 80.0, "round", ["bend"]),
+        ("bend", 8.0, "bend", ["round"]),
+        ("round", 8.0, "bend", ["round"]),
+    ],
+)
+def test_a_term_that_imitates_an_effect_is_tried_beside_it(truth, sigmas, found, rivals):
+    """It takes the effect's place where readings say so, and is its rival where they do not."""
+    t = np.tile(np.linspace(0.0, 1.0, 60), 4)
+    run = np.repeat(np.arange(4), 60)
+    columns = {"a": np.ones_like(t), "b": t, "bend_size": np.maximum(t - 0.5, 0.0)}
+    columns["round_size"] = 0.05 * np.log1p(np.exp((t - 0.5) / 0.05))
+    clean = 1.0 + 2.0 * t + sigmas * SIGMA * columns[f"{truth}_size"]
+    observed = clean + SIGMA * np.random.default_rng(2).normal(size=len(t))
+
+    def effect(name, acts_on=""):
+        amplitude = Parameter(f"{name}_size", amplitude=True)
+        return Effect(name, "linear", "", (Variant("only", (amplitude,)),), acts_on=acts_on)
+
+    test = Linear(readings(observed, run=run), columns, ("a", "b"), noise=SIGMA)
+    test.effects, test.terms = [effect("bend")], [effect("round", "reading")]
+    test.terms_are_rivals, test.imitated = False, {"bend": ("round",)}
+    said = diagnose_test(test)
+    assert [e.name for e in said.effects] == [found]
+    assert said.rivals[found] == rivals

@@ -206,6 +206,11 @@ class Experiment(Protocol):
         ...
 
     @property
+    def imitated(self) -> Mapping[str, Sequence[str]]:
+        """Names of terms that do nearly what a candidate does, tried beside it, by its name."""
+        ...
+
+    @property
     def notes(self) -> Sequence[str]:
         """What a reader of the report has to know of the model."""
         ...

@@ -55,14 +55,17 @@ def diagnose_test(
     if not search.accounted:
         further.most = None
         return _beside(further.run(), found)
+    own = [effect.name for effect in found.effects]
+    alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
         least = -CRITERIA.decisive
     elif search.doubtful_noise or (experiment.terms_are_rivals and found.effects):
         # Before noise is said to be more than was stated, or as slow as a misfit, terms are tried.
-        own = [effect.name for effect in found.effects]
         terms = [t for t in experiment.terms if not set(own) & set(t.general_form_of)]
         least = CRITERIA.decisive
+    elif alike:
+        terms, least = [t for t in terms if t.name in alike], CRITERIA.decisive
     else:
         return found
     single = Search(experiment, terms, progress, most=1)
@@ -77,7 +80,7 @@ def diagnose_test(
         elif search.effects_needed == 1:
             _name(single, other, other.effects[0], search, found.effects[0])
         return _beside(other, found)
-    if search.effects_needed == 1 and experiment.terms_are_rivals:
+    if search.effects_needed == 1 and (experiment.terms_are_rivals or alike):
         _name_terms(search, found, final, single, other)
     return found
 

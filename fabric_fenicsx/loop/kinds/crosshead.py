@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from math import inf
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -61,6 +62,7 @@ class CrossheadTest:
     quantity = "force_N"
     notes: Sequence[str] = ()
     terms_are_rivals = False
+    imitated: Mapping[str, tuple[str, ...]] = MappingProxyType({})
     alike: frozenset[str] = frozenset()
     listed: ClassVar[tuple[Effect, ...]] = ()
     """The effects of this test."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -109,6 +110,10 @@ class Cantilever:
     one_curve = None
     curves_only = False
     terms_are_rivals = False
+    # A camera that is turned sees a strip that is tilted, but for how that bends.
+    imitated: Mapping[str, tuple[str, ...]] = MappingProxyType(
+        {"clamp_tilt": ("reading_of_distance",)}
+    )
     alike: frozenset[str] = frozenset()
 
     def __init__(

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,7 @@ class Drape:
     one_curve = None
     curves_only = False
     terms_are_rivals = False
+    imitated: Mapping[str, tuple[str, ...]] = MappingProxyType({})
     alike: frozenset[str] = frozenset()
     terms = ()
 
