@@ -389,9 +389,7 @@ def test_a_state_of_rest_that_moves_is_the_same_in_both():
     "numbers",
     [
         {"base": "odd", "variable": "largest_angle", "powers": [1, 3], "constant": 0.0},
-        {"base": "viscous", "variable": "path", "powers": [0, 1], "constants": [0.1, 0.2]},
         {"base": "dissipative", "variable": "path", "powers": [0, 1], "constants": [0.1, 0.2]},
-        {"base": "odd_in_rate", "variable": "rate", "powers": [0, 2], "constant": 0.0},
     ],
 )
 def test_a_factor_of_two_variables_is_the_same_in_both(numbers):
