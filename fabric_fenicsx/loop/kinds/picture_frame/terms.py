@@ -86,7 +86,7 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
         "elastic": ("largest_angle", "path", "time", "rate", "unloading", *FORGETFUL),
         "rest": ("largest_angle", "path", "time"),
         "viscous": ("angle", "largest_angle", "path", "time", "unloading", *FORGETFUL),
-        "dissipative": ("angle", "largest_angle", "path", "time", "unloading", *FORGETFUL),
+        "dissipative": ("angle", "largest_angle", "path", "time", "rate", "unloading", *FORGETFUL),
         "odd": ("angle",),
         "even": ("angle",),
         "odd_in_rate": ("rate",),
