@@ -6,7 +6,7 @@ and stands for whatever law of that variable there is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 from typing import Any
@@ -15,19 +15,19 @@ import numpy as np
 from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shaped import GRADED, OF_ELASTIC, ShapedLaw, shape_of
+from ....mechanics.laws.shaped import FRICTION, GRADED, OF_ELASTIC, ShapedLaw, shape_of
 from ...inference.effects import Effect, Shape, Values, valued
 from .variant import FrameVariant
 
 __all__ = [
     "FORGETFUL",
-    "MEMORIES",
-    "STICKS",
     "X",
     "Y",
+    "as_reported",
+    "fitted",
     "of_a_law",
     "ranges_of",
-    "reported",
+    "remembering",
     "shapes",
     "terms",
 ]
@@ -94,10 +94,7 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
     }
     also = {"viscous": ("rate",), "dissipative": ("direction",)}
     for base, variables in bases.items():
-        groups: dict[str, list[str]] = {}
-        for variable in variables:
-            groups.setdefault(reported(variable), []).append(variable)
-        for by, own in groups.items():
+        for by, own in as_reported(variables).items():
             name = f"{base}_moment_of_{by}"
             alike = ("dissipative", "smooth") if base == "dissipative" else (base,)
             forms = [f for b in alike for v in own for f in _laws(name, b, v, largest)]
@@ -150,11 +147,34 @@ ABOUT = {"rest": "state of rest of the elastic moment"}
 CALLED = {"unloading": "direction", "relative_angle": "largest_angle"}
 
 
-def reported(variable: str) -> str:
-    """What a variable is called in a report."""
-    if variable in CALLED:
-        return CALLED[variable]
-    return "history" if variable in FORGETFUL else variable
+def as_reported(variables: Sequence[str]) -> dict[str, list[str]]:
+    """Variables by what they are called in a report."""
+    groups: dict[str, list[str]] = {}
+    for variable in variables:
+        default = "history" if variable in FORGETFUL else variable
+        groups.setdefault(CALLED.get(variable, default), []).append(variable)
+    return groups
+
+
+def remembering(
+    name: str, base: str, variable: str, largest: Mapping[str, float]
+) -> dict[str, Parameter]:
+    """What a memory of a variable, or a friction, has that is fitted beside its shape."""
+    found = {}
+    if variable in FORGETFUL:
+        full = largest["time"]
+        starts = tuple(share * full for share in MEMORIES)
+        found["memory"] = Parameter(f"{name}_memory_s", starts, starts[0] / 10.0, full)
+    if base in FRICTION:
+        found["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-4, 0.3)
+    return found
+
+
+def fitted(numbers: Mapping[str, Any]) -> tuple[Parameter, ...]:
+    """The parameters among a term's numbers, amplitudes first."""
+    every = [*numbers["coefficients"], *numbers.get("constants", ()), *numbers.values()]
+    parameters = [n for n in every if isinstance(n, Parameter)]
+    return tuple(sorted(parameters, key=lambda p: not p.amplitude))
 
 
 def _laws(
@@ -162,21 +182,15 @@ def _laws(
 ) -> Iterator[FrameVariant]:
     """Forms of a factor of a moment."""
     fixed: dict[str, Any] = {"base": base, "variable": variable, "reach": largest[variable]}
-    if variable in FORGETFUL:
-        full = largest["time"]
-        starts = tuple(share * full for share in MEMORIES)
-        fixed["memory"] = Parameter(f"{name}_memory_s", starts, starts[0] / 10.0, full)
-    if base in ("dissipative", "smooth"):
-        fixed["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-4, 0.3)
+    fixed |= remembering(name, base, variable, largest)
+    if base in FRICTION:
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
     of_baseline = ("k1_N", "k3_N") if base in OF_ELASTIC else ()
     for label, coefficients, numbers in shapes(name, _wealth(base, variable)):
-        own = fixed | numbers
-        parameters = [*coefficients, *(n for n in own.values() if isinstance(n, Parameter))]
-        own["coefficients"] = coefficients
+        own = fixed | numbers | {"coefficients": coefficients}
         yield FrameVariant(
             f"{variable.replace('_', ' ')}, {label}" + (", smooth" if base == "smooth" else ""),
-            tuple(sorted(parameters, key=lambda p: not p.amplitude)),
+            fitted(own),
             shape=Shape(
                 X[variable], Y.get(base, "moment_N"), largest[variable], partial(_factor, own), own
             ),
@@ -312,12 +326,10 @@ def _of_rig(
             size = value(p, max_value(min_value(at[variable] / reach, 1), -1))
             return size * shape_of("sign", (1.0,), at["speed"], width=slow) if turning else size
 
-        numbers = own.values()
-        parameters = [*own["coefficients"], *(n for n in numbers if isinstance(n, Parameter))]
         also = {"variable": variable} | ({"slow": slow} if turning else {})
         yield FrameVariant(
             label,
-            tuple(sorted(parameters, key=lambda p: not p.amplitude)),
+            fitted(own),
             shape=Shape(X[variable], Y[acts_on], reach, value, own | also, between),
             of=of,
             added_reading=added if acts_on == "reading" else None,
