@@ -207,8 +207,10 @@ class CrossheadTest:
         """What a term without a formula depends on, at every reading; see Experiment."""
         assert isinstance(variant, FrameVariant)
         if variant.laws is None:
-            known = self._force(self._points, (), values)
-            return self._at_readings(self._known(known)[variant.of[0]]().value)
+            whole = self._force(self._points, (), values)
+            if variant.variable is None:
+                return self._at_readings(self._known(whole)[variant.of[0]]().value)
+            return self._at_readings(self._of_rig(variant, "variable", whole, values).value)
         key = (variant, "along")
         if key not in self._compiled:
             names = tuple(p.name for p in variant.parameters) + variant.of_baseline
@@ -292,7 +294,7 @@ class CrossheadTest:
         for v in mine:
             if v.added_travel is not None:
                 # The force with the travel as it would be without: what is added is little.
-                ahead = self._added(v, "travel", whole, values)
+                ahead = self._of_rig(v, "travel", whole, values)
                 travel = self._moved(travel, ahead)
                 whole = self._force(travel, mine, values)
         zeros: list[tuple[Flags, Array]] = []
@@ -300,7 +302,7 @@ class CrossheadTest:
         read = whole
         for v in mine:
             if v.added_reading is not None:
-                read += cell * self._added(v, "reading", whole, values)
+                read += cell * self._of_rig(v, "reading", whole, values)
             if v.reading is not None and v.each_run:
                 added, own_zeros = self._each_run(v, values, read.value)
                 read += cell * added
@@ -350,18 +352,27 @@ class CrossheadTest:
             {p: self._gathered(np.broadcast_to(slope, shape)) for p, slope in work.slopes.items()},
         )
 
-    def _added(
-        self, variant: FrameVariant, to: str, force: Varying, values: Mapping[str, float]
+    def _of_rig(
+        self, variant: FrameVariant, wanted: str, force: Varying, values: Mapping[str, float]
     ) -> Varying:
-        """What a form adds to the reading [N] or to the travel [mm]."""
-        key = (variant, to)
+        """What a form adds to the "reading" [N] or to the "travel" [mm], or its "variable"."""
+        key = (variant, wanted)
         if key not in self._compiled:
-            expression = variant.added_reading if to == "reading" else variant.added_travel
-            assert expression is not None
             marched = Marched(variant.of, tuple(p.name for p in variant.parameters))
-            self._compiled[key] = marched.define({"added": expression(marched.at, marched.at)}, {})
+            at, history = dict(marched.at), {}
+            if variant.remembered is not None:
+                past = marched.remembered("memory")
+                at["memory"] = history["memory"] = variant.remembered(marched.at, at, past)
+            if wanted == "variable":
+                assert variant.variable is not None
+                value = variant.variable(at)
+            else:
+                of = variant.added_reading if wanted == "reading" else variant.added_travel
+                assert of is not None
+                value = of(marched.at, at)
+            self._compiled[key] = marched.define({wanted: value}, history)
         marched, known = self._compiled[key], self._known(force)
-        return marched({name: known[name]() for name in marched.inputs}, values)["added"]
+        return marched({name: known[name]() for name in marched.inputs}, values)[wanted]
 
     def _known(self, force: Varying) -> dict[str, Callable[[], Varying]]:
         """What is known at a reading, by the names of FrameVariant.of, where it is wanted."""
@@ -372,6 +383,7 @@ class CrossheadTest:
             "acceleration": lambda: self._per_second(self._points["D_rate"]),
             "force": lambda: force,
             "force_rate": lambda: self._per_second(force),
+            "per_time": lambda: self._points["per_time"],
         }
 
     def _since_start(self) -> Varying:

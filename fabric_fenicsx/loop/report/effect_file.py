@@ -67,28 +67,15 @@ SHAPE = {{
 }}
 
 
-def added(p, at):
-    """What is added: {y}."""
-    x = max_value(min_value(at["{variable}"] / REACH, 1), -1)
-    return p["{name}_amount"] * {value}
+def added(p, x):
+    """What is added, {y}, at {x} = x."""
+    share = max_value(min_value(x / REACH, 1), -1)
+    return p["{name}_amount"] * ({constant!r} + ff.shape_of(x=share, **SHAPE))
 
 
-EFFECTS = [
-    ff.Effect(
-        "{name}",
-        "{test}",
-        "{about}",
-        (ff.FrameVariant("as found", (AMOUNT,), of={of!r}, added_{acts_on}=added),),
-        of_fabric=False,
-    )
-]
+FOUND = ff.of_the_rig("as found", (AMOUNT,), "{acts_on}", "{variable}", added{options})
+EFFECTS = [ff.Effect("{name}", "{test}", "{about}", (FOUND,), of_fabric=False)]
 '''
-
-VALUE = "({constant!r} + ff.shape_of(x=x, **SHAPE))"
-AGAINST_THE_MOTION = """(
-        ({constant!r} + ff.shape_of(x=x, **SHAPE))
-        * ff.shape_of("sign", (1.0,), at["speed"], width={slow!r})
-    )"""
 
 OF_A_STRIP = """
 import fabric_fenicsx as ff
@@ -139,11 +126,8 @@ def effect_file(term: Discovered, titles: str) -> str:
         return (HEAD + LAW).format(numbers=lines, **words)
     numbers["kind"], variable = numbers.pop("shape"), numbers.pop("variable")
     constant = numbers.pop("constant", 0.0)
-    value, of = VALUE.format(constant=constant), [variable]
-    if "slow" in numbers:
-        slow = numbers.pop("slow")
-        value = AGAINST_THE_MOTION.format(constant=constant, slow=slow)
-        of = [variable, "speed"]
+    options = {key: numbers.pop(key) for key in ("memory", "turning", "slow") if key in numbers}
     lines = "\n".join(f"    {name!r}: {value!r}," for name, value in numbers.items())
-    rig = {"variable": variable, "value": value, "of": tuple(of)}
+    rig = {"variable": variable, "constant": constant}
+    rig["options"] = "".join(f", {key}={value!r}" for key, value in options.items())
     return (HEAD + OF_THE_RIG).format(numbers=lines, **rig, **words)

@@ -15,7 +15,8 @@ from typing import Any
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import product_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .terms import FORGETFUL, X, Y, as_reported, fitted, of_a_law, ranges_of, remembering, shapes
+from .shapes import FORGETFUL, X, Y, fitted, shapes
+from .terms import as_reported, of_a_law, ranges_of, remembering
 from .variant import FrameVariant
 
 __all__ = ["products"]

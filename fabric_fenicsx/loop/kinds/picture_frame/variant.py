@@ -27,7 +27,11 @@ class FrameVariant(Variant):
         added_reading: what the load cell adds [N], from the parameters and what ``of`` names.
         added_travel: by how much the frame is ahead of the crosshead [mm], from the same.
         of: of "time" in the run [s], the crosshead's "displacement" [mm], "speed" [mm/s] and
-            "acceleration" [mm/s²], the "force" [N] of the model and its "force_rate" [N/s].
+            "acceleration" [mm/s²], the "force" [N] of the model and its "force_rate" [N/s], and
+            "per_time", 1 over the step from the point before [1/s].
+        remembered: what ``added_reading`` and ``added_travel`` find as "memory" among these, from
+            the parameters, the others, and its value at the point before; 0 before the first.
+        variable: what a term without a formula depends on, from these; by default the first.
         of_baseline: parameters of the baseline that ``laws`` needs as well.
         each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
             has. Those of a holdout run can only come from that run: its error is then what is
@@ -41,6 +45,8 @@ class FrameVariant(Variant):
     added_reading: Callable[[Values, Values], Any] | None = None
     added_travel: Callable[[Values, Values], Any] | None = None
     of: tuple[str, ...] = ()
+    remembered: Callable[[Values, Values, Any], Any] | None = None
+    variable: Callable[[Values], Any] | None = None
     of_baseline: tuple[str, ...] = ()
     each_run: bool = False
 
