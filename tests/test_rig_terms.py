@@ -86,23 +86,26 @@ def slipping_grips(t, D, speed):
     return given_way(t, D, lambda force, behind, h: max(behind, 0.0015 * force * abs(force)))
 
 
-def write(folder, measured):
+RUNS = {"a": PROGRAMME, "b": PROGRAMME[::-1][1:], "c": LAST}
+
+
+def write(folder, measured, runs=RUNS):
     folder.mkdir(parents=True)
     rng = np.random.default_rng(3)
     lines = []
-    for name, legs in {"a": PROGRAMME, "b": PROGRAMME[::-1][1:], "c": LAST}.items():
+    for k, (name, legs) in enumerate(runs.items()):
         at = np.cumsum([0.0, *(seconds for seconds, _ in legs)])
         ends = np.array([0.0, *(place for _, place in legs)])
         fine = np.linspace(0.0, at[-1], 10 * int(at[-1]) + 1)
         D = np.interp(fine, at, ends)
         leg = np.clip(np.searchsorted(at, fine) - 1, 0, len(legs) - 1)
         speed = (np.diff(ends) / np.diff(at))[leg]
-        force = measured(fine, D, speed)[::10]
+        force = (measured(fine, D, speed, k) if runs is MORE else measured(fine, D, speed))[::10]
         force = force + NOISE * rng.standard_normal(len(force))
         table = np.column_stack([fine[::10], D[::10], force])
         head = "time_s,displacement_mm,force_N"
         np.savetxt(folder / f"{name}.csv", table, "%.9g", ",", header=head, comments="")
-        role = "holdout" if name == "c" else "fit"
+        role = "holdout" if legs is LAST else "fit"
         lines.append(f"- {{file: {name}.csv, role: {role}, specimen: S}}\n")
     (folder / "measurement.yaml").write_text(
         "schema: fabric-measurement/1\ntest: picture_frame\ntitle: a rig\n"
@@ -111,6 +114,49 @@ def write(folder, measured):
         f"noise: {{force_N: {NOISE}}}\nruns:\n" + "".join(lines)
     )
     return PictureFrame([read_measurement(folder)])
+
+
+MORE = {"a": PROGRAMME, "b": PROGRAMME[::-1][1:], "c": LAST, "d": PROGRAMME[1:], "e": PROGRAMME}
+
+
+def wearing_spring(t, D, speed, run):
+    """Each run takes 4 % of the spring as it was new."""
+    still = force_of(D, np.zeros_like(D))
+    return force_of(D, speed) - 0.04 * run * still
+
+
+def wandering_zero(t, D, speed, run):
+    """The crosshead's zero is 0.05 mm further with each run."""
+    return force_of(D - 0.05 * run, speed)
+
+
+@pytest.mark.parametrize(
+    ("measured", "term", "slope"),
+    [
+        (wearing_spring, "elastic_moment_of_run", -0.04),
+        (wandering_zero, "travel_of_run", -0.05),
+    ],
+)
+def test_what_changes_from_run_to_run(tmp_path, measured, term, slope):
+    """Leaves noise in the run held out between them, and is as large as it was put in."""
+    experiment = write(tmp_path / "set", measured, MORE)
+    (variant,) = (
+        v for t in experiment.terms if t.name == term for v in t.variants if v.label == "linear"
+    )
+    readings, white = experiment.readings, Variances(Noise(NOISE))
+    rows, holdout = readings.fit, readings.holdout & readings.usable
+    start = BASE | {p.name: 1e-3 for p in variant.parameters}
+    found = fit(experiment, (variant,), start, rows, white)
+    assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
+    assert found.rms(rows) < 1.1 * NOISE and found.rms(holdout) < 1.2 * NOISE
+    assert found.values[f"{term}_1"] / 4.0 == pytest.approx(slope, rel=0.05)
+
+
+def test_two_runs_have_no_term_by_the_run(tmp_path):
+    """What two runs differ by is a line whatever it is."""
+    few = {"a": PROGRAMME, "b": PROGRAMME[::-1][1:]}
+    names = {t.name for t in write(tmp_path / "few", creeping_cell, few).terms}
+    assert not any("_of_run" in name for name in names)
 
 
 def stepped(variant, values, **columns):
@@ -215,11 +261,14 @@ def test_derivatives_of_what_remembers(tmp_path, name):
         ("travel_of_displacement_lag", "linear"),
         ("reading_of_force_and_direction", "2 coefficients"),
         ("reading_of_displacement_and_direction", "linear, kept in a hold"),
+        ("travel_of_run", "linear"),
+        ("elastic_moment_of_run", "saturation"),
+        ("viscous_moment_of_run", "2 coefficients"),
     ],
 )
 def test_the_file_is_the_term(tmp_path, name, label):
     """As an effect with one amount it adds the same, and is taken from the file."""
-    experiment = write(tmp_path / "set", creeping_cell)
+    experiment = write(tmp_path / "set", wearing_spring, MORE)
     effect = next(t for t in experiment.terms if t.name == name)
     variant = next(v for v in effect.variants if v.label == label)
     sizes = iter((0.3, -0.2, 0.4))

@@ -33,7 +33,7 @@ from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
-from .records import laid_out, of_a_crossing, typical
+from .records import laid_out, of_a_crossing, runs_before, typical
 
 __all__ = ["CrossheadTest"]
 
@@ -94,6 +94,7 @@ class CrossheadTest:
             usable=np.concatenate([p.certain for p in motions]),
         )
         self.readings = self._named(readings)
+        self._before = runs_before(self.readings)
         self._leave_out_uncertain(np.concatenate([p.rate_error for p in motions]))
         self._start()
         shares = {
@@ -206,6 +207,8 @@ class CrossheadTest:
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """What a term without a formula depends on, at every reading; see Experiment."""
         assert isinstance(variant, FrameVariant)
+        if variant.by_run is not None:
+            return self._at_readings(self._each(self._before["specimen"]).value)
         if variant.laws is None:
             whole = self._force(self._points, (), values)
             if variant.variable is None:
@@ -384,7 +387,12 @@ class CrossheadTest:
             "force": lambda: force,
             "force_rate": lambda: self._per_second(force),
             "per_time": lambda: self._points["per_time"],
+            "run": lambda: self._each(self._before["folder"]),
         }
+
+    def _each(self, numbers: Array) -> Varying:
+        """A number of each run at its points."""
+        return Varying(np.broadcast_to(numbers, self._points["time"].value.shape))
 
     def _since_start(self) -> Varying:
         """Time in each run [s]."""
@@ -451,7 +459,21 @@ class CrossheadTest:
                 moment = moment + law.moment(crossing)
                 history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
             self._compiled[key] = marched.define({"moment": moment}, history)
-        return self._compiled[key](known, values)["moment"]
+        moment = self._compiled[key](known, values)["moment"]
+        if variant is None or variant.by_run is None:
+            return moment
+        return moment * self._by_run(variant, values)
+
+    def _by_run(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
+        """The factor of a form's moments that goes by the run."""
+        key = (variant, "by run")
+        if key not in self._compiled:
+            assert variant.by_run is not None
+            marched = Marched(("run",), tuple(p.name for p in variant.parameters))
+            factor = variant.by_run(marched.at, marched.at["run"])
+            self._compiled[key] = marched.define({"factor": factor}, {})
+        run = self._each(self._before["specimen"])
+        return self._compiled[key]({"run": run}, values)["factor"]
 
     def _reading(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
         key = (variant, "reading")

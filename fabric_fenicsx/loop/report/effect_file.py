@@ -73,9 +73,12 @@ def added(p, x):
     return p["{name}_amount"] * ({constant!r} + ff.shape_of(x=share, **SHAPE))
 
 
-FOUND = ff.of_the_rig("as found", (AMOUNT,), "{acts_on}", "{variable}", added{options})
+FOUND = {found}
 EFFECTS = [ff.Effect("{name}", "{test}", "{about}", (FOUND,), of_fabric=False)]
 '''
+
+FOUND_OF_THE_RIG = 'ff.of_the_rig("as found", (AMOUNT,), "{acts_on}", "{variable}", added{options})'
+FOUND_OF_THE_RUN = 'ff.of_the_run("as found", (AMOUNT,), "{base}", added)'
 
 OF_A_STRIP = """
 import fabric_fenicsx as ff
@@ -124,10 +127,13 @@ def effect_file(term: Discovered, titles: str) -> str:
             numbers |= {"k1": term.values["k1_N"], "k3": term.values["k3_N"]}
         lines = "\n".join(f"    {name}={value!r}," for name, value in numbers.items())
         return (HEAD + LAW).format(numbers=lines, **words)
-    numbers["kind"], variable = numbers.pop("shape"), numbers.pop("variable")
-    constant = numbers.pop("constant", 0.0)
     options = {key: numbers.pop(key) for key in ("memory", "turning", "slow") if key in numbers}
+    if "of" in numbers:
+        words["found"] = FOUND_OF_THE_RUN.format(base=numbers.pop("of"))
+    else:
+        more = "".join(f", {key}={value!r}" for key, value in options.items())
+        rig = {"variable": numbers.pop("variable"), "options": more, **words}
+        words["found"] = FOUND_OF_THE_RIG.format(**rig)
+    numbers["kind"], constant = numbers.pop("shape"), numbers.pop("constant", 0.0)
     lines = "\n".join(f"    {name!r}: {value!r}," for name, value in numbers.items())
-    rig = {"variable": variable, "constant": constant}
-    rig["options"] = "".join(f", {key}={value!r}" for key, value in options.items())
-    return (HEAD + OF_THE_RIG).format(numbers=lines, **rig, **words)
+    return (HEAD + OF_THE_RIG).format(numbers=lines, constant=constant, **words)

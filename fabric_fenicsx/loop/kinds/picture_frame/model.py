@@ -77,6 +77,8 @@ class PictureFrame(CrossheadTest):
         if self.curves_only:
             return []
         ranges = self._ranges()
+        fitted = np.unique(self.readings.run[self.readings.fit])
+        ranges |= {f"run_of_{name}": max(n[fitted]) for name, n in self._before.items()}
         return [*terms(ranges, self._ends()), *products(ranges)]
 
     @property

@@ -14,7 +14,7 @@ from ....inputs.parameters import Parameter
 from ....mechanics.laws.law import size_of
 from ....mechanics.laws.shaped import recent, shape_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .shapes import Ends, X, Y, factor, fitted, memory_of, shapes, wealth
+from .shapes import Ends, X, Y, factor, fitted, memory_of, over_runs, shapes, wealth
 from .variant import FrameVariant
 
 __all__ = ["RIG_VARIABLES", "RigVariable", "of_the_rig", "rig_terms"]
@@ -60,7 +60,7 @@ def _lag(name: str, at: Values) -> Any:
 
 RIG_VARIABLES = {
     name: RigVariable((name,), partial(_itself, name))
-    for name in ("displacement", "force", "speed", "acceleration", "force_rate", "time")
+    for name in ("displacement", "force", "speed", "acceleration", "force_rate", "time", "run")
 } | {
     "recent_force": RigVariable(
         ("force", "per_time"), partial(_itself, "memory"), partial(_mean, "force")
@@ -88,6 +88,7 @@ RIG: dict[str, dict[str, tuple[str, ...]]] = {
         "force_rate": ("force", "rate"),
         "force_lag": ("force", "time"),
         "time": ("time",),
+        "run": ("run",),
     },
     "travel": {
         "displacement": ("displacement",),
@@ -97,6 +98,7 @@ RIG: dict[str, dict[str, tuple[str, ...]]] = {
         "largest_force": ("force", "direction"),
         "time": ("time",),
         "speed": ("direction",),
+        "run": ("run",),
     },
 }
 """What acts on the reading and the travel, and what its variable is called in a report."""
@@ -112,11 +114,13 @@ def rig_terms(largest: Mapping[str, float], ends: Ends) -> Iterator[Effect]:
     """The terms.
 
     Args:
-        largest: sizes of the variables; see terms.ranges_of.
+        largest: sizes of the variables; see terms.ranges_of. There are none by what it has not.
         ends: between which shares of these the signed ones are.
     """
     for acts_on, variables in RIG.items():
         for variable, reported in variables.items():
+            if variable not in largest:
+                continue
             name = f"{acts_on}_of_{variable}"
             forms = _forms(acts_on, name, variable, largest, ends)
             yield _term(acts_on, name, reported, forms)
@@ -248,7 +252,7 @@ def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
 
 def _zero(name: str, turning: Turning) -> dict[str, Parameter]:
     """The zero of a load cell is not where a run begins, nor is a friction nothing there."""
-    if turning or name == "reading_of_time":
+    if turning or name in ("reading_of_time", "reading_of_run", "travel_of_run"):
         return {"constant": Parameter(f"{name}_0", amplitude=True)}
     return {}
 
@@ -265,12 +269,13 @@ def _added(name: str, variable: str, turning: Turning) -> Iterator[tuple[str, di
             return
     constant = _zero(name, turning)
     few = 2 if turning == "kept in a hold" else wealth(name.partition("_")[0], variable)
-    for label, coefficients, numbers in shapes(name, few):
+    for label, coefficients, numbers in over_runs(name) if variable == "run" else shapes(name, few):
         yield label, numbers | {"coefficients": coefficients} | constant
     if variable in ("time", "displacement") and not turning:
         waves = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))
         most = CYCLES[variable]
         periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
         period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
-        wave = {"shape": "periodic", "coefficients": waves, "width": period}
-        yield "periodic", wave | constant
+        # Where a run begins a wave may be anywhere.
+        zero = {"constant": Parameter(f"{name}_0", amplitude=True)}
+        yield "periodic", {"shape": "periodic", "coefficients": waves, "width": period} | zero

@@ -9,7 +9,18 @@ from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import GRADED, shape_of
 from ...inference.effects import Values, valued
 
-__all__ = ["FORGETFUL", "Ends", "X", "Y", "factor", "fitted", "memory_of", "shapes", "wealth"]
+__all__ = [
+    "FORGETFUL",
+    "Ends",
+    "X",
+    "Y",
+    "factor",
+    "fitted",
+    "memory_of",
+    "over_runs",
+    "shapes",
+    "wealth",
+]
 
 #: Numbers of coefficients of a spline; the last one of what a place may have to itself.
 SPLINES = (1, 2, 3, 5, 9)
@@ -50,6 +61,7 @@ X = {
     "largest_force": "largest_force_N",
     "force_lag": "force_lag_N",
     "displacement_lag": "displacement_lag_mm",
+    "run": "runs_before",
 }
 """Variables with their units."""
 
@@ -116,3 +128,9 @@ def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...],
         yield "graded", own, {"shape": "graded"}
         bend = Parameter(f"{name}_bend", BENDS, 1e-3, 1.0)
         yield "logarithm", one, {"shape": "logarithm", "width": bend}
+
+
+def over_runs(name: str) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
+    """Shapes over the few runs that there are: as ``shapes``, but no more than two numbers."""
+    chosen = ("linear", "2 coefficients", "saturation")
+    return (shape for shape in shapes(name, 2) if shape[0] in chosen)

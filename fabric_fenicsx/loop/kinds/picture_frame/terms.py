@@ -6,22 +6,29 @@ and stands for whatever law of that variable there is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 from typing import Any
 
+from ufl import min_value
+
 from ....inputs.parameters import Parameter
+from ....mechanics.laws.dashpots import LinearDashpot
+from ....mechanics.laws.law import CrossingLaw
 from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ShapedLaw
+from ....mechanics.laws.springs import PolynomialSpring
 from ...inference.effects import Effect, Shape, Values, valued
 from .rig_terms import rig_terms
-from .shapes import FORGETFUL, Ends, X, Y, factor, fitted, memory_of, shapes, wealth
+from .shapes import FORGETFUL, Ends, X, Y, factor, fitted, memory_of, over_runs, shapes, wealth
 from .variant import FrameVariant
 
-__all__ = ["as_reported", "of_a_law", "ranges_of", "remembering", "terms"]
+__all__ = ["as_reported", "of_a_law", "of_the_run", "ranges_of", "remembering", "terms"]
 
 #: Angles in which a friction begins to slide [rad].
 STICKS = (0.005, 0.03)
+#: Runs before another that a term by the run needs: what two runs differ by is anything.
+FEWEST_BEFORE = 2
 
 
 def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> list[Effect]:
@@ -30,11 +37,13 @@ def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> lis
     Args:
         ranges: largest size in the fitted readings of "angle", "rate", "path" [rad], "time" [s],
             "displacement" [mm], "speed" [mm/s], "acceleration" [mm/s²], "force" [N] and of its
-            change, "force_rate" [N/s].
+            change, "force_rate" [N/s], and how many runs were before, "run_of_folder" and
+            "run_of_specimen": with less than two of them, or none given, there are no terms by the
+            run.
         ends: of those that may be negative.
     """
     largest = ranges_of(ranges)
-    return [*_of_the_crossing(largest), *rig_terms(largest, ends)]
+    return [*_of_the_crossing(largest), *_by_run(largest), *rig_terms(largest, ends)]
 
 
 def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
@@ -44,6 +53,8 @@ def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
     largest |= {"displacement_lag": ranges["displacement"]}
     largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
     largest["relative_angle"] = 1.0
+    if ranges.get("run_of_folder", 0.0) >= FEWEST_BEFORE:
+        largest["run"] = ranges["run_of_folder"]
     return largest | {name: ranges["angle"] for name in ("recent_angle", "recent_largest_angle")}
 
 
@@ -75,6 +86,64 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
                 acts_on="moment",
                 depends_on=depends_on,
             )
+
+
+def _by_run(largest: Mapping[str, float]) -> Iterator[Effect]:
+    """What changes from one run of a specimen to the next."""
+    reach = largest.get("run_of_specimen", 0.0)
+    if reach < FEWEST_BEFORE:
+        return
+    for base, also in {"elastic": (), "viscous": ("rate",)}.items():
+        name = f"{base}_moment_of_run"
+        forms = []
+        for label, coefficients, numbers in over_runs(name):
+            own = numbers | {"coefficients": coefficients}
+            value = partial(factor, own)
+            shape = Shape(X["run"], Y[base], reach, value, own | {"of": base})
+            share = partial(_share, value, reach)
+            forms.append(of_the_run(label, fitted(own), base, share, shape=shape))
+        yield Effect(
+            name,
+            "picture_frame",
+            f"{base} moment, by the run of a specimen",
+            tuple(forms),
+            of_fabric=False,
+            acts_on="moment",
+            depends_on=("run", *also),
+        )
+
+
+def _share(value: Any, reach: float, p: Values, run: Any) -> Any:
+    return value(p, min_value(run / reach, 1))
+
+
+def of_the_run(
+    label: str,
+    parameters: tuple[Parameter, ...],
+    base: str,
+    share: Callable[[Values, Any], Any],
+    *,
+    shape: Shape | None = None,
+) -> FrameVariant:
+    """A form of what a moment of the baseline changes by from one run of a specimen to the next.
+
+    Args:
+        label: what tells it from other forms.
+        parameters: its numbers.
+        base: "elastic", of the spring, or "viscous", of the rate.
+        share: how many times that is added, from the parameters and how many runs were before.
+        shape: of a term without a formula.
+    """
+
+    def laws(values: Values) -> tuple[CrossingLaw, ...]:
+        if base == "viscous":
+            return (LinearDashpot(1.0),)
+        return (PolynomialSpring(k1=values["k1_N"], k3=values["k3_N"]),)
+
+    of_baseline = ("k1_N", "k3_N") if base in OF_ELASTIC else ()
+    return FrameVariant(
+        label, parameters, shape=shape, laws=laws, by_run=share, of_baseline=of_baseline
+    )
 
 
 ABOUT = {"rest": "state of rest of the elastic moment"}

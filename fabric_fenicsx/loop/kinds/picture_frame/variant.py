@@ -20,6 +20,7 @@ class FrameVariant(Variant):
 
     Attributes:
         laws: laws of a crossing (mechanics.laws) whose moments per area of fabric [N] add.
+        by_run: factor of these, from the parameters and how many runs of its specimen were before.
         travel: true crosshead displacement [mm] from the parameters, the crosshead's place D [mm]
             and the true displacement at the reading before, None unless ``remembers_travel``.
         reading: what the load cell adds [N] at the time t [s].
@@ -28,7 +29,8 @@ class FrameVariant(Variant):
         added_travel: by how much the frame is ahead of the crosshead [mm], from the same.
         of: of "time" in the run [s], the crosshead's "displacement" [mm], "speed" [mm/s] and
             "acceleration" [mm/s²], the "force" [N] of the model and its "force_rate" [N/s], and
-            "per_time", 1 over the step from the point before [1/s].
+            "per_time", 1 over the step from the point before [1/s], and "run", how many there were
+            before in its folder.
         remembered: what ``added_reading`` and ``added_travel`` find as "memory" among these, from
             the parameters, the others, and its value at the point before; 0 before the first.
         variable: what a term without a formula depends on, from these; by default the first.
@@ -39,6 +41,7 @@ class FrameVariant(Variant):
     """
 
     laws: Callable[[Values], tuple[Any, ...]] | None = None
+    by_run: Callable[[Values, Any], Any] | None = None
     travel: Callable[[Values, Any, Any], Any] | None = None
     reading: Callable[[Values, Any], Any] | None = None
     remembers_travel: bool = False
