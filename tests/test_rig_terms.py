@@ -1,4 +1,6 @@
-"""Terms without a formula of a rig: load cells and grips that remember, guides that rub."""
+"""Terms without a formula of what remembers: a rig, and a specimen from run to run."""
+
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -13,6 +15,7 @@ from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.rig_terms import of_the_rig
+from fabric_fenicsx.loop.own_effects import read_effects
 from fabric_fenicsx.loop.report.discovered import Discovered
 from fabric_fenicsx.loop.report.effect_file import effect_file
 
@@ -150,6 +153,63 @@ def test_what_changes_from_run_to_run(tmp_path, measured, term, slope):
     assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
     assert found.rms(rows) < 1.1 * NOISE and found.rms(holdout) < 1.2 * NOISE
     assert found.values[f"{term}_1"] / 4.0 == pytest.approx(slope, rel=0.05)
+
+
+def sum_of_earlier(run, of):
+    """What ``of(angle)`` of earlier runs add up to."""
+    total = 0.0
+    for legs in [*MORE.values()][:run]:
+        D = np.concatenate([[0.0], *(np.linspace(a, b, 200) for a, b in pairwise(ends_of(legs)))])
+        total += of(angle_at(D))
+    return total
+
+
+def ends_of(legs):
+    return [0.0, *(place for _, place in legs)]
+
+
+def angle_at(D):
+    return np.pi / 2 - 2 * np.arccos((np.sqrt(2.0) + D / FRAME) / 2.0)
+
+
+def abraded_spring(t, D, speed, run):
+    """Of the spring 30 % are lost with the path of all runs, within 0.8 rad."""
+    gamma = angle_at(D)
+    path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(gamma)))])
+    path = path + sum_of_earlier(run, lambda g: np.abs(np.diff(g)).sum())
+    still = force_of(D, np.zeros_like(D))
+    return force_of(D, speed) - 0.3 * (1.0 - np.exp(-path / 0.8)) * still
+
+
+def test_a_specimen_remembers_its_earlier_runs(tmp_path):
+    """The path of all its runs leaves noise, that of each does not, and the file says which."""
+    experiment = write(tmp_path / "set", abraded_spring, MORE)
+    effect = next(t for t in experiment.terms if t.name == "elastic_moment_of_path")
+    readings, white = experiment.readings, Variances(Noise(NOISE))
+    rows, holdout = readings.fit, readings.holdout & readings.usable
+
+    def left(label):
+        variant = next(v for v in effect.variants if v.label == label)
+        some = BASE | {p.name: -0.1 for p in variant.amplitudes}
+        starts = [some | shape for shape in variant.grid(amplitudes=False)]
+        fits = [fit(experiment, (variant,), start, rows, white) for start in starts]
+        return min(fits, key=lambda found: found.sum_of_squares)
+
+    found = left("path of all runs, saturation")
+    assert found.rms(rows) < 1.1 * NOISE and found.rms(holdout) < 1.2 * NOISE
+    assert left("path, saturation").rms(rows) > 3.0 * NOISE
+    (variant,) = found.variants
+    width = variant.shape.reach * found.values["elastic_moment_of_path_decay"]
+    assert width == pytest.approx(0.8, rel=0.05)
+    term = Discovered("discovered_1", effect, variant, found.values, pd.DataFrame(), "formula")
+    (tmp_path / "discovered_1.py").write_text(effect_file(term, "made up"))
+    again = PictureFrame(
+        [read_measurement(tmp_path / "set")], read_effects(tmp_path / "discovered_1.py")
+    )
+    (own,) = (e for e in again.effects if e.name == "discovered_1")
+    values = found.values | {"discovered_1_amount": 1.0}
+    same, _ = again.predict(own.variants, values)
+    assert same == pytest.approx(found.expected, abs=1e-9)
 
 
 def test_two_runs_have_no_term_by_the_run(tmp_path):

@@ -223,7 +223,8 @@ class CrossheadTest:
             history = {f"0 {n}": value for n, value in law.history(crossing).items()}
             variable = law.variable_at(crossing)
             self._compiled[key] = marched.define({"variable": variable}, history)
-        found = self._compiled[key](self._kinematics(self._points, {}), values)["variable"]
+        known, first = self._kinematics(self._points, {}), self._from_earlier_runs(variant)
+        found = self._compiled[key](known, values, first)["variable"]
         return self._shown(found.value)
 
     def _ranges(self) -> dict[str, float]:
@@ -459,10 +460,15 @@ class CrossheadTest:
                 moment = moment + law.moment(crossing)
                 history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
             self._compiled[key] = marched.define({"moment": moment}, history)
-        moment = self._compiled[key](known, values)["moment"]
+        first = {} if variant is None else self._from_earlier_runs(variant)
+        moment = self._compiled[key](known, values, first)["moment"]
         if variant is None or variant.by_run is None:
             return moment
         return moment * self._by_run(variant, values)
+
+    def _from_earlier_runs(self, variant: FrameVariant) -> dict[str, Array]:
+        """What a form's law remembers where a run begins, by name; see Marched."""
+        return {}
 
     def _by_run(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
         """The factor of a form's moments that goes by the run."""

@@ -42,7 +42,7 @@ class {class_name}(ff.CrossingLaw):
             "{name}",
             "as found",
             ({{"amount": ff.Parameter("{name}_amount", amplitude=True)}},),
-            meaning="{about}",
+            meaning="{about}",{carried}
         ),
     )
 
@@ -126,6 +126,8 @@ def effect_file(term: Discovered, titles: str) -> str:
         if numbers["base"] in OF_ELASTIC:
             numbers |= {"k1": term.values["k1_N"], "k3": term.values["k3_N"]}
         lines = "\n".join(f"    {name}={value!r}," for name, value in numbers.items())
+        carried: str = getattr(term.variant, "carried", "")
+        words["carried"] = f'\n            carried="{carried}",' if carried else ""
         return (HEAD + LAW).format(numbers=lines, **words)
     options = {key: numbers.pop(key) for key in ("memory", "turning", "slow") if key in numbers}
     if "of" in numbers:

@@ -109,7 +109,7 @@ class Cantilever:
     notes = ()
     one_curve = None
     curves_only = False
-    terms_are_rivals = False
+    terms_are_rivals = True
     # A camera that is turned sees a strip that is tilted, but for how that bends.
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType(
         {"clamp_tilt": ("reading_of_distance",)}

@@ -27,6 +27,8 @@ __all__ = ["as_reported", "of_a_law", "of_the_run", "ranges_of", "remembering", 
 
 #: Angles in which a friction begins to slide [rad].
 STICKS = (0.005, 0.03)
+#: Memories that may go on from one run of a specimen to the next.
+CARRIED = ("largest_angle", "path")
 #: Runs before another that a term by the run needs: what two runs differ by is anything.
 FEWEST_BEFORE = 2
 
@@ -39,7 +41,8 @@ def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> lis
             "displacement" [mm], "speed" [mm/s], "acceleration" [mm/s²], "force" [N] and of its
             change, "force_rate" [N/s], and how many runs were before, "run_of_folder" and
             "run_of_specimen": with less than two of them, or none given, there are no terms by the
-            run.
+            run. "path_of_specimen" [rad] is that of all runs, where a specimen had several: a
+            memory may then go on from one to the next.
         ends: of those that may be negative.
     """
     largest = ranges_of(ranges)
@@ -75,6 +78,9 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             name = f"{base}_moment_of_{by}"
             alike = ("dissipative", "smooth") if base == "dissipative" else (base,)
             forms = [f for b in alike for v in own for f in _laws(name, b, v, largest)]
+            if "path_of_specimen" in largest:
+                kept = [v for v in own if v in CARRIED]
+                forms += [f for b in alike for v in kept for f in _laws(name, b, v, largest, True)]
             depends_on, words = (by, *also.get(base, ())), base.replace("_", " ")
             yield Effect(
                 name,
@@ -175,10 +181,11 @@ def remembering(
 
 
 def _laws(
-    name: str, base: str, variable: str, largest: Mapping[str, float]
+    name: str, base: str, variable: str, largest: Mapping[str, float], carried: bool = False
 ) -> Iterator[FrameVariant]:
-    """Forms of a factor of a moment."""
-    fixed: dict[str, Any] = {"base": base, "variable": variable, "reach": largest[variable]}
+    """Forms of a factor of a moment; carried, its memory goes on in a specimen's next run."""
+    reach = largest["path_of_specimen" if carried and variable == "path" else variable]
+    fixed: dict[str, Any] = {"base": base, "variable": variable, "reach": reach}
     fixed |= remembering(name, base, variable, largest)
     if base in FRICTION:
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
@@ -186,12 +193,12 @@ def _laws(
     for label, coefficients, numbers in shapes(name, wealth(base, variable)):
         own = fixed | numbers | {"coefficients": coefficients}
         yield FrameVariant(
-            f"{variable.replace('_', ' ')}, {label}" + (", smooth" if base == "smooth" else ""),
+            f"{variable.replace('_', ' ')}{' of all runs' if carried else ''}, {label}"
+            + (", smooth" if base == "smooth" else ""),
             fitted(own),
-            shape=Shape(
-                X[variable], Y.get(base, "moment_N"), largest[variable], partial(factor, own), own
-            ),
+            shape=Shape(X[variable], Y.get(base, "moment_N"), reach, partial(factor, own), own),
             laws=partial(of_a_law, own),
+            carried=variable if carried else "",
             of_baseline=of_baseline,
         )
 

@@ -34,6 +34,8 @@ class FrameVariant(Variant):
         remembered: what ``added_reading`` and ``added_travel`` find as "memory" among these, from
             the parameters, the others, and its value at the point before; 0 before the first.
         variable: what a term without a formula depends on, from these; by default the first.
+        carried: what ``laws`` remember as "variable" from earlier runs of a specimen, "path" or
+            "largest_angle"; empty where each run begins anew.
         of_baseline: parameters of the baseline that ``laws`` needs as well.
         each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
             has. Those of a holdout run can only come from that run: its error is then what is
@@ -50,6 +52,7 @@ class FrameVariant(Variant):
     of: tuple[str, ...] = ()
     remembered: Callable[[Values, Values, Any], Any] | None = None
     variable: Callable[[Values], Any] | None = None
+    carried: str = ""
     of_baseline: tuple[str, ...] = ()
     each_run: bool = False
 
@@ -73,7 +76,12 @@ def law_effects(
             (form.meaning for _, form in forms if form.meaning), ""
         )
         variants = [
-            FrameVariant(form.label, form.parameters, laws=partial(form.laws, law))
+            FrameVariant(
+                form.label,
+                form.parameters,
+                laws=partial(form.laws, law),
+                carried=form.carried,
+            )
             for law, form in sorted(forms, key=lambda pair: pair[1].rank)
         ]
         of_fabric = all(law.of_fabric for law, _ in forms)
