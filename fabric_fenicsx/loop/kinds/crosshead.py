@@ -26,7 +26,7 @@ from ...mechanics.laws.dashpots import LinearDashpot
 from ...mechanics.laws.springs import PolynomialSpring
 from ...mechanics.scalars import derivative_of
 from ..expressions.marching import Marched, Varying
-from ..inference.effects import Effect, Variant, of_run, scaled
+from ..inference.effects import Effect, Variant, of_each_run, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ..inference.noise import estimated_noise
 from ..measurement.readings import common_noise, readings_of
@@ -492,14 +492,7 @@ class CrossheadTest:
 
     def _with_runs(self, effect: Effect) -> Effect:
         """Parameters of their own for each run that is fitted, where a form wants them."""
-        runs = np.unique(self.readings.run[self.readings.fit & self.readings.first])
-
-        def expanded(v: Variant) -> Variant:
-            if not (isinstance(v, FrameVariant) and v.each_run):
-                return v
-            own = tuple(of_run(p, int(run)) for run in runs for p in v.parameters)
-            return replace(v, parameters=own)
-
+        runs = np.unique(self.readings.run[self.readings.fit & self.readings.first]).tolist()
         each = [v for v in effect.variants if getattr(v, "each_run", False)]
         shared = [v for v in effect.variants if v not in each]
         if len(np.unique(self.readings.run[self.readings.first])) == 1:
@@ -507,7 +500,7 @@ class CrossheadTest:
         elif each and len(runs) == 1:
             # One fitted run cannot tell the two apart: nothing is claimed of the other runs.
             shared = [v for v in shared if getattr(v, "reading", None) is None]
-        return replace(effect, variants=tuple(expanded(v) for v in (*shared, *each)))
+        return replace(effect, variants=tuple(of_each_run(v, runs) for v in (*shared, *each)))
 
     def _each_run(
         self, variant: FrameVariant, values: Mapping[str, float], force: Array

@@ -95,6 +95,15 @@ EFFECTS = [
 """
 
 
+OF_EACH_RUN = """
+import fabric_fenicsx as ff
+
+ZERO = ff.Parameter("{name}_zero_mm", amplitude=True, meaning="of a run; no other has the same")
+FOUND = ff.StripVariant("zero", (ZERO,), each_run=True)
+EFFECTS = [ff.Effect("{name}", "cantilever", "{about}", (FOUND,), of_fabric=False)]
+"""
+
+
 def effect_file(term: Discovered, titles: str) -> str:
     """The text of a term's file.
 
@@ -116,6 +125,8 @@ def effect_file(term: Discovered, titles: str) -> str:
         "y": shape.y,
         "acts_on": term.effect.acts_on,
     }
+    if shape.points:
+        return (HEAD + OF_EACH_RUN).format(**words)
     if term.effect.test == "cantilever":
         values = {p.name: term.values[p.name] for p in term.variant.parameters}
         ranges = shape.fixed["ranges"]

@@ -21,7 +21,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from ufl import exp, max_value, min_value
+from ufl import conditional, exp, lt, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.bending_laws import TabulatedBending
@@ -324,8 +324,18 @@ def _of_the_run(runs: Sequence[int]) -> Iterator[Effect]:
     if len(runs) > 1:
         name = "reading_of_run"
         zero = Parameter(f"{name}_zero_mm", amplitude=True)
-        forms = [StripVariant("zero", tuple(of_run(zero, k) for k in runs), each_run=True)]
+        each = tuple(of_run(zero, k) for k in runs)
+        last = max(runs) + 1.0
+        value, points = partial(_of_its_run, each, last), tuple((k + 1) / last for k in runs)
+        shape = Shape("run", "height_mm", last, value, points=points)
+        forms = [StripVariant("zero", each, shape=shape, each_run=True)]
         yield _term(name, "a zero of the heights in each run", "reading", ("run",), forms)
+
+
+def _of_its_run(each: Sequence[Parameter], last: float, p: Values, x: Any) -> Any:
+    """The zero of the run that has the number x times the last one's, counted from 1."""
+    own = ((q.run + 1, p[q.name]) for q in each if q.run is not None)
+    return sum(conditional(lt(abs(x * last - number), 0.5), zero, 0.0) for number, zero in own)
 
 
 def _higher(
