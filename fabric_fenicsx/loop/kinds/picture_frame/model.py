@@ -100,12 +100,14 @@ class PictureFrame(CrossheadTest):
     def shear(self) -> tuple[Array, Array]:
         """Angle [rad] and force over moment per area [mm] at every reading, (n,) each."""
         known = self._kinematics(self._points, {})
-        return self._at_readings(known["gamma"].value), self._at_readings(known["factor"].value)
+        return self._recorded.at_readings(known["gamma"].value), self._recorded.at_readings(
+            known["factor"].value
+        )
 
     def _steady(self, rows: npt.NDArray[np.bool_]) -> bool:
         """Whether some readings are of one way at one speed of the crosshead or of the angle."""
-        rate = self._at_readings(self._kinematics(self._points, {})["rate"].value)[rows]
-        speed = self._at_readings(self._points["D_rate"].value)[rows]
+        rate = self._recorded.at_readings(self._kinematics(self._points, {})["rate"].value)[rows]
+        speed = self._recorded.at_readings(self._points["D_rate"].value)[rows]
         return len(rate) > 0 and any(
             np.ptp(v) <= SAME_RATE * float(np.abs(v).max(initial=0.0)) for v in (speed, rate)
         )
