@@ -86,6 +86,7 @@ def test_a_term_that_imitates_an_effect_is_tried_beside_it(truth, sigmas, found,
     test = Linear(readings(observed, run=run), columns, ("a", "b"), noise=SIGMA)
     test.effects, test.terms = [effect("bend")], [effect("round", "reading")]
     test.terms_are_rivals, test.imitated = False, {"bend": ("round",)}
+    test.each_its_own_way = False
     said = diagnose_test(test)
     assert [e.name for e in said.effects] == [found]
     assert said.rivals[found] == rivals

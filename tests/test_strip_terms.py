@@ -276,6 +276,24 @@ def test_nothing_is_discovered_where_there_is_nothing():
     assert found.verdict == "no_effect" and not found.effects
 
 
+@pytest.mark.parametrize(
+    ("lengths", "specimens", "own"),
+    [
+        ((100.0, 150.0, 200.0), "abc", True),
+        ((100.0, 150.0, 200.0), "aaa", False),
+        ((100.0, 150.0, 150.0), "abc", False),
+        ((100.0, 150.0, 200.0), "aab", False),
+    ],
+)
+def test_whether_each_specimen_has_an_overhang_of_its_own(lengths, specimens, own):
+    plain = strips(lengths, count=8)
+    runs = tuple(
+        replace(run, holdout=False, specimen=name)
+        for run, name in zip(plain.runs, specimens, strict=True)
+    )
+    assert Cantilever([replace(plain, runs=runs)]).each_its_own_way is own
+
+
 def test_zeros_of_runs_are_a_term(tmp_path):
     """With a table of the runs, and a file that has a zero of each run it is tried on."""
     zeros = (1.0, -2.0, 3.0, 0.5)

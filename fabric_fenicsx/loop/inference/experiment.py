@@ -206,6 +206,14 @@ class Experiment(Protocol):
         ...
 
     @property
+    def each_its_own_way(self) -> bool:
+        """Whether every specimen was tested in a way of its own.
+
+        What they differ by may then be what the way brings out.
+        """
+        ...
+
+    @property
     def imitated(self) -> Mapping[str, Sequence[str]]:
         """Names of terms that do nearly what a candidate does, tried beside it, by its name."""
         ...

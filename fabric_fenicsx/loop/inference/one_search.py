@@ -55,6 +55,8 @@ class Search:
         self.effects_needed = 0
         #: Whether noise is more than was stated for that, or slow.
         self.doubtful_noise = False
+        #: Whether specimens differ in it.
+        self.specimens_differ = False
         #: Models of one effect, the best first.
         self.singles: Sequence[Model] = ()
         #: Asked, where one effect does not do, whether another search has found what does.
@@ -84,6 +86,7 @@ class Search:
         self.accounted = self.judge.accounts(chosen, baseline)
         self.effects_needed = len(chosen.effects)
         self.doubtful_noise = self.judge.doubtful_noise(chosen)
+        self.specimens_differ = bool(chosen.fit.deviations)
         nearest = _nearest(levels)
         final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
         if final.effects:

@@ -3,7 +3,8 @@
 First the effects with a name. Where none of them accounts for the fitted readings the same is done
 with terms without a formula beside them: what acts on what, and by what does it go? Where a single
 one does, such terms may be its rivals (see Experiment.terms_are_rivals), and are where readings
-would have to scatter by more than was stated or go together for long. Before several effects with
+would have to scatter by more than was stated or go together for long, or specimens to differ that
+were each tested in a way of their own. Before several effects with
 a name are fitted together a single term is looked for: if it leaves noise, and they far more, they
 are not.
 """
@@ -57,10 +58,12 @@ def diagnose_test(
         return _beside(further.run(), found)
     own = [effect.name for effect in found.effects]
     alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
+    in_its_way = experiment.each_its_own_way and search.specimens_differ
+    rivals = bool(own) and (experiment.terms_are_rivals or in_its_way)
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
         least = -CRITERIA.decisive
-    elif search.doubtful_noise or (experiment.terms_are_rivals and found.effects):
+    elif search.doubtful_noise or rivals:
         # Before noise is said to be more than was stated, or as slow as a misfit, terms are tried.
         terms = [t for t in experiment.terms if not set(own) & set(t.general_form_of)]
         least = CRITERIA.decisive
@@ -80,7 +83,7 @@ def diagnose_test(
         elif search.effects_needed == 1:
             _name(single, other, other.effects[0], search, found.effects[0])
         return _beside(other, found)
-    if search.effects_needed == 1 and (experiment.terms_are_rivals or alike):
+    if search.effects_needed == 1 and (rivals or alike):
         _name_terms(search, found, final, single, other)
     return found
 

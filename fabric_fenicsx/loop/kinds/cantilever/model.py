@@ -109,7 +109,7 @@ class Cantilever:
     notes = ()
     one_curve = None
     curves_only = False
-    terms_are_rivals = True
+    terms_are_rivals = False
     # A camera that is turned sees a strip that is tilted, but for how that bends.
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType(
         {"clamp_tilt": ("reading_of_distance",)}
@@ -174,6 +174,13 @@ class Cantilever:
             "stiffness_per_C1": self.stiffness_per_C1,
         }
         return terms(ranges, np.unique(self._run[rows]).tolist())
+
+    @property
+    def each_its_own_way(self) -> bool:
+        """Whether every specimen hung at one overhang, which no other one had."""
+        rows = self.readings.fit
+        pairs = np.unique(np.stack([self.readings.specimen[rows], self._length[rows]]), axis=1)
+        return all(len(np.unique(one)) == pairs.shape[1] for one in pairs)
 
     @property
     def _distance(self) -> Array:

@@ -93,6 +93,7 @@ class Drape:
     one_curve = None
     curves_only = False
     terms_are_rivals = False
+    each_its_own_way = False
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType({})
     alike: frozenset[str] = frozenset()
     terms = ()
