@@ -16,13 +16,14 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import numpy.typing as npt
-from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints
-from vtkmodules.vtkCommonDataModel import VTK_LINE, VTK_VERTEX, vtkCellArray, vtkUnstructuredGrid
+from vtkmodules.vtkCommonDataModel import VTK_LINE, VTK_VERTEX, vtkUnstructuredGrid
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import write_text, write_vtk
+from fabric_fenicsx.output.polydata import cell_array
 from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["TimeSeries"]
@@ -195,15 +196,9 @@ def _grid(
     count, size = cells.shape
     places = vtkPoints()
     places.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
-    offsets = np.arange(0, count * size + 1, size, dtype=np.int64)
-    numbers = np.ascontiguousarray(cells, dtype=np.int64).ravel()
-    array = vtkCellArray()
-    array.SetData(
-        numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(numbers, deep=True)
-    )
     grid = vtkUnstructuredGrid()
     grid.SetPoints(places)
-    grid.SetCells(kind, array)
+    grid.SetCells(kind, cell_array(np.full(count, size), cells))
     return grid
 
 

@@ -17,12 +17,13 @@ from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import write_npz, write_vtk
 from fabric_fenicsx.output.mirror import whole_sheet
+from fabric_fenicsx.output.polydata import poly_data
 from fabric_fenicsx.output.surfaces import (
     OTHER_COLOUR,
     TOOL_COLOURS,
     RevolvedSurface,
     TriangleSurface,
-    triangulated,
+    triangles,
 )
 from fabric_fenicsx.solving.snapshot import Snapshot
 
@@ -130,7 +131,8 @@ def write_setup(
         old.unlink()
     for tool in tools:
         shapes.mkdir(exist_ok=True)
-        write_vtk(shapes / f"{tool.name}.vtp", triangulated(tool))
+        points, cells = triangles(tool)
+        write_vtk(shapes / f"{tool.name}.vtp", poly_data(points, faces=cells))
 
 
 def read_net(path: Path) -> Net:
