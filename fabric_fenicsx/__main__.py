@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from .processor import choose_kernels
-from .startup import stand_in_for_pkg_resources
+from .startup import collect_seldom, stand_in_for_pkg_resources
 
 __all__ = ["main"]
 
@@ -24,6 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if given and given[0] in SOLVING:
         choose_kernels()
         stand_in_for_pkg_resources()
+        collect_seldom()
     if not os.environ.get("DISPLAY"):
         # VTK tries an X server first and complains when there is none.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from importlib import import_module
 from importlib.metadata import version
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
-__all__ = ["stand_in_for_pkg_resources"]
+__all__ = ["collect_seldom", "stand_in_for_pkg_resources"]
 
 NAME = "pkg_resources"
+
+
+#: New objects after which Python looks for cycles among them; 700 by default, which the trees of a
+#: single form surpass many times.
+SELDOM = 20_000
+
+
+def collect_seldom() -> None:
+    """Look for objects that only refer to each other less often, a twentieth of a short run."""
+    gc.set_threshold(SELDOM, *gc.get_threshold()[1:])
 
 
 class Versions(ModuleType):

@@ -38,6 +38,8 @@ def _by_measure(form: ufl.Form) -> list[ufl.Form]:
     integrals of one measure are summed here because UFL would expand each for itself first and then
     compare what they share node by node, which took most of the time of a compilation.
     """
+    if len(form.integrals()) == 1:
+        return [form]
     groups: dict[str, list[Any]] = {}
     for integral in form.integrals():
         measure = (
