@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 from zlib import Z_RLE
@@ -227,18 +229,12 @@ def canvas(
         InputError: a window is wanted and no screen can be reached.
     """
     with _quiet():
-        window: Any = vtkRenderWindow()
-        window.SetOffScreenRendering(path is not None)
+        window = _window() if path is None else _unseen()
         finer = 1 if path is None else FINER
         window.SetSize(finer * size[0], finer * size[1])
-        window.SetMultiSamples(8 if path is None else 0)
+        scene = Canvas(window, finer, lights)
         try:
-            if path is None and window.GetClassName() in UNSEEN:
-                raise InputError(
-                    "a window: the screen that DISPLAY names cannot be reached, "
-                    "allowed is a saved picture"
-                )
-            yield Canvas(window, finer, lights)
+            yield scene
             if path is None:
                 _show(window)
             else:
@@ -247,7 +243,31 @@ def canvas(
                 with replacing(Path(path)) as partial:
                     _save(window, partial)
         finally:
-            window.Finalize()
+            window.RemoveRenderer(scene.renderer)
+            if path is None:
+                window.Finalize()
+
+
+@cache
+def _unseen() -> Any:
+    """The window behind all pictures: its programs are compiled for the first of them only."""
+    window: Any = vtkRenderWindow()
+    window.SetOffScreenRendering(True)
+    window.SetMultiSamples(0)
+    # Before VTK is taken apart.
+    atexit.register(window.Finalize)
+    return window
+
+
+def _window() -> Any:
+    """A window to be looked at."""
+    window: Any = vtkRenderWindow()
+    if window.GetClassName() in UNSEEN:
+        raise InputError(
+            "a window: the screen that DISPLAY names cannot be reached, allowed is a saved picture"
+        )
+    window.SetMultiSamples(8)
+    return window
 
 
 def _show(window: Any) -> None:
