@@ -31,8 +31,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not os.environ.get("DISPLAY"):
         # VTK tries an X server first and complains when there is none.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        # pyvista would open a window to learn whether it can.
-        os.environ.setdefault("ALLOW_PLOTTING", "true")
 
     from .cli import app
     from .cli.collective import say

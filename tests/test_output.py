@@ -23,6 +23,7 @@ from fabric_fenicsx.output.lines import COLOURS, arc_length
 from fabric_fenicsx.output.paraview import TimeSeries
 from fabric_fenicsx.output.pictures import VIEWS, _stations, aim, draw_net
 from fabric_fenicsx.output.surfaces import RevolvedSurface, triangles
+from fabric_fenicsx.output.vtk_xml import packed, xml_file
 from fabric_fenicsx.solving.snapshot import Snapshot, at_rest
 
 ARRAYS = [field.name for field in fields(Snapshot) if field.name != "time"]
@@ -411,3 +412,26 @@ def test_tubes_have_pieces_where_their_curve_bends():
     longest = np.sqrt(8.0 * radius * near)
     assert 0.5 * longest < np.diff(fine).max() < 1.1 * longest
     assert np.isin(arc_length(bent), fine).all()
+
+
+@pytest.mark.parametrize("count", [0, 3, 200_000])
+def test_files_without_vtk_are_those_that_vtk_reads(tmp_path: Path, count: int):
+    """Also without a number in it, and with more than VTK puts into one block."""
+    points = np.random.default_rng(count).normal(size=(count, 3))
+    corners = np.arange(3 * (count // 3))
+    name = 'a <&" b'
+    sections = {
+        "PointData": {name: packed(points, ("u", "v", "w"))},
+        "Points": {"Points": packed(points, small=True)},
+        "Polys": {
+            "connectivity": packed(corners, small=True),
+            "offsets": packed(3 * np.arange(1, count // 3 + 1)),
+        },
+    }
+    counts = {"NumberOfPoints": count, "NumberOfPolys": count // 3}
+    parts = xml_file("PolyData", counts, sections, {"when": packed(np.array([1.5]))})
+    (tmp_path / "a.vtp").write_bytes(b"".join(parts))
+    mesh = pv.read(tmp_path / "a.vtp")
+    assert np.array_equal(mesh.points, points) and np.array_equal(mesh.point_data[name], points)
+    assert np.array_equal(mesh.faces.reshape(-1, 4)[:, 1:].ravel(), corners)
+    assert mesh.field_data["when"] == [1.5]
