@@ -181,6 +181,7 @@ def test_two_rates_do_not_tell_a_power_from_friction():
     assert found.verdict == "unexplained" and found.holdout_best > 2.0 * found.noise
 
 
+@pytest.mark.slow
 def test_two_rates_on_two_specimens_tell_as_much_as_their_springs_are_alike():
     """Springs that agree say that dashpots would: what is left is a matter of the rate.
 

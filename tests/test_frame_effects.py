@@ -67,7 +67,11 @@ def diagnosed(**how):
 
 @pytest.mark.parametrize(
     ("form", "behind", "ahead"),
-    [("play", 0.5, 0.5), ("play on the way out", 1.0, 0.0), ("play on the way back", 0.0, 1.0)],
+    [
+        pytest.param("play", 0.5, 0.5, marks=pytest.mark.slow),
+        pytest.param("play on the way out", 1.0, 0.0, marks=pytest.mark.slow),
+        ("play on the way back", 0.0, 1.0),
+    ],
 )
 def test_play_is_found_by_what_happens_at_the_turns(form, behind, ahead):
     found = diagnosed(follow=lambda D: followed(D, behind, ahead))

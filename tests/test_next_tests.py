@@ -11,6 +11,7 @@ from measurements.advised import recipes, trials
 from measurements.cantilever import Strip, hang
 from scipy.stats import norm
 
+from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference.effects import Variant
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
@@ -77,6 +78,26 @@ def fitted(one, other, seed=0, times=1):
 def further(times=1, *, new_specimen=True):
     run = Lines(np.tile(AFTER, times), np.zeros(times * len(AFTER)))
     return [(Proposal("read on", None, {"t": run.t}, new_specimen), run)]
+
+
+class NoCube(Lines):
+    """Without a solution where a cube is added, as of a strip that finds no balance."""
+
+    def predict(self, variants, values, deviations=NO_DEVIATIONS):
+        if CUBE in variants:
+            raise SolveError("no balance")
+        return super().predict(variants, values, deviations)
+
+
+def test_a_model_without_a_solution_advises_nothing():
+    """Fitted with specimens that differ, it may have none for what they have in common."""
+    line, square, cube = fitted(SQUARE, CUBE)
+    names = ("square", "cube")
+    assert best_tests(line, further(), names, [square], [cube], SIGMA, {})
+    without = NoCube(line.t, line.readings.observed)
+    assert best_tests(without, further(), names, [square], [cube], SIGMA, {}) == []
+    both = best_tests(without, further(), names, [square], [cube, square], SIGMA, {})
+    assert both and both[0].separation < 1.0
 
 
 def columns(variant, t):

@@ -1,6 +1,8 @@
 """Terms without a formula in strips: against shooting, their derivatives, and found in readings."""
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,10 +10,16 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
+from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.cantilever import CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
+from fabric_fenicsx.loop.own_effects import read_effects
+from fabric_fenicsx.loop.report.discovered import Discovered, _shape_table
+from fabric_fenicsx.loop.report.effect_file import effect_file
 
 WIDTH, HEIGHT, SPACING = 4.57, 0.04, 12.0
 DENSITY = 0.6  # kg/m²
@@ -266,3 +274,31 @@ def test_term_is_discovered(wanted):
 def test_nothing_is_discovered_where_there_is_nothing():
     found = searched()
     assert found.verdict == "no_effect" and not found.effects
+
+
+def test_zeros_of_runs_are_a_term(tmp_path):
+    """With a table of the runs, and a file that has a zero of each run it is tried on."""
+    zeros = (1.0, -2.0, 3.0, 0.5)
+    plain = strips((LENGTH, 150.0, 200.0, 180.0), count=8)
+    plain = replace(plain, runs=tuple(replace(run, holdout=False) for run in plain.runs))
+    for run, zero in zip(plain.runs, zeros, strict=True):
+        run.columns["z_mm"] += zero
+    experiment = Cantilever([plain])
+    effect = next(t for t in experiment.terms if t.name == "reading_of_run")
+    (variant,) = effect.variants
+    start = {"C1_MPa": C1} | {p.name: 0.0 for p in variant.parameters}
+    white = Variances(Noise(0.05))
+    found = fit(experiment, (variant,), start, experiment.readings.fit, white)
+    table = _shape_table(SimpleNamespace(final=found), variant)
+    assert table["run"].tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert table["height_mm"].to_numpy() == pytest.approx(zeros, abs=0.03)
+    term = Discovered("discovered_1", effect, variant, found.values, table, "no short formula")
+    (tmp_path / "discovered_1.py").write_text(effect_file(term, "made up"))
+    again = Cantilever([plain], read_effects(tmp_path / "discovered_1.py"))
+    (own,) = (e for e in again.effects if e.name == "discovered_1")
+    names = [p.name for p in own.variants[0].parameters]
+    assert names == [f"run{k}_discovered_1_zero_mm" for k in (1, 2, 3, 4)]
+    values = {"C1_MPa": found.values["C1_MPa"]}
+    values |= dict(zip(names, table["height_mm"], strict=True))
+    same, _ = again.predict(own.variants, values)
+    assert same == pytest.approx(found.expected, abs=1e-6)

@@ -92,13 +92,10 @@ class Whole:
 
     def assemble(self) -> None:
         """Assemble the tangent at the increment and section forces set last. Collective."""
-        A, P, rows = self._A, self.matrix, self._held
+        A, P = self._A, self.matrix
         self._system.tangent(A)
         A.copy(P, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        P.diagonalScale(self._free, self._free)
-        if len(rows):
-            P.setValuesRCV(rows, rows, np.ones(rows.shape))
-        P.assemble()
+        _hold(P, self._free, self._held)
 
     def mult(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Y = A x. Collective."""
@@ -175,13 +172,10 @@ class OfComponents:
 
     def factorise(self) -> None:
         """Factorise the tangent as it was assembled last."""
-        P, rows = self._P, self._held
+        P = self._P
         blocks = _stored_blocks(self._A).reshape(-1, BLOCK * BLOCK)
         _stored_blocks(P)[:] = blocks[:, self._inside].ravel()
-        P.diagonalScale(self._free, self._free)
-        if len(rows):
-            P.setValuesRCV(rows, rows, np.ones(rows.shape))
-        P.assemble()
+        _hold(P, self._free, self._held)
         self._solver.setOperators(P)
         self._solver.setUp()
 
@@ -392,6 +386,14 @@ def _stored_blocks(A: PETSc.Mat) -> npt.NDArray[np.float64]:
     get = getattr(petsc(), f"MatSeq{kind}GetArray")
     get(ctypes.c_void_p(A.handle), ctypes.byref(values))
     return np.ctypeslib.as_array(values, (int(A.getInfo()["nz_used"]),))
+
+
+def _hold(P: PETSc.Mat, free: PETSc.Vec, held: npt.NDArray[Any]) -> None:
+    """Ones on the diagonal of prescribed rows, which ``held`` has, nothing beside. Collective."""
+    P.diagonalScale(free, free)
+    if len(held):
+        P.setValuesRCV(held, held, np.ones(held.shape))
+    P.assemble()
 
 
 Tangent = Whole | OfComponents | Condensed

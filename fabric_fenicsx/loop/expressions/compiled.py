@@ -106,8 +106,9 @@ def march(
 
     Returns:
         A function of the inputs (n_inputs, n_points, n_records), their slopes
-        (n_inputs, n_active, n_points, n_records), the parameters' values and their places among
-        the active ones. It gives memory and its slopes before each point, shaped likewise.
+        (n_inputs, n_active, n_points, n_records), the parameters' values, their places among the
+        active ones, and the memory before the first point (n_memory, n_records). It gives memory
+        and its slopes before each point, shaped likewise.
     """
     places = (
         {name: f"x[{k} * size + at]" for k, name in enumerate(inputs)}
@@ -137,10 +138,13 @@ def march(
     function = ctypes.CDLL(str(_library(source))).march
     n_memory = len(memory)
 
-    def run(x: Array, dx: Array, values: Array, slot: npt.NDArray[Any]) -> tuple[Array, Array]:
+    def run(
+        x: Array, dx: Array, values: Array, slot: npt.NDArray[Any], first: Array
+    ) -> tuple[Array, Array]:
         points, records = x.shape[1:]
         active = dx.shape[1]
         h = np.zeros((n_memory, points, records))
+        h[:, 0] = first
         dh = np.zeros((n_memory, active, points, records))
         arrays = [np.ascontiguousarray(a, dtype=float) for a in (x, dx, values)]
         index = np.ascontiguousarray(slot, dtype=ctypes.c_long)

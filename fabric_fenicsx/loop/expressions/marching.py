@@ -1,6 +1,6 @@
 """Expressions with memory, marched over a record, with their derivatives in the parameters.
 
-    y_i = f(x_i, h_i; p),    h_{i+1} = g(x_i, h_i; p),    h_0 = 0
+    y_i = f(x_i, h_i; p),    h_{i+1} = g(x_i, h_i; p),    h_0 = 0 or given
     dy_i/dp = ∂f/∂p + ∂f/∂x dx_i/dp + ∂f/∂h dh_i/dp,    and dh/dp is marched along with h
 
 f and g are UFL; so are their derivatives. Records stand side by side, (n_points, n_records), and
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -77,14 +78,24 @@ class Marched:
         return self
 
     def __call__(
-        self, inputs: Mapping[str, Varying], values: Mapping[str, float]
+        self,
+        inputs: Mapping[str, Varying],
+        values: Mapping[str, float],
+        first: Mapping[str, Array] = MappingProxyType({}),
     ) -> dict[str, Varying]:
-        """Evaluate over whole records."""
+        """Evaluate over whole records.
+
+        Args:
+            inputs: by their names.
+            values: of the parameters.
+            first: what is remembered before the first point of each record, (n_records,), by name
+                as in ``remembered``; of others nothing.
+        """
         known = {name: inputs[name] for name in self.inputs}
         numbers = {name: values[name] for name in self.parameters}
         shape = next(iter(known.values())).value.shape
         if self._memory:
-            known |= self._march(known, numbers, shape)
+            known |= self._march(known, numbers, shape, first)
         at = {name: varying.value for name, varying in known.items()} | numbers
         results = self._differentiated(known)(at)
         return {
@@ -103,9 +114,13 @@ class Marched:
         return self._outputs[moving]
 
     def _march(
-        self, known: dict[str, Varying], numbers: dict[str, float], shape: tuple[int, ...]
+        self,
+        known: dict[str, Varying],
+        numbers: dict[str, float],
+        shape: tuple[int, ...],
+        first: Mapping[str, Array],
     ) -> dict[str, Varying]:
-        """What is remembered before each point, zero before the first."""
+        """What is remembered before each point."""
         # A memory that no parameter goes into is the same loop for every law that has it.
         own = [p for p in self.parameters if ("given", p) in self._history.steps.operations]
         active = sorted({*own, *(p for v in known.values() for p in v.slopes)})
@@ -125,7 +140,10 @@ class Marched:
                 tuple(self._memory),
                 tuple(own),
             )
-        h, dh = self._loop(x, dx, values, slot)
+        h0 = np.zeros((len(self._memory), shape[1]))
+        for k, name in enumerate(self._memory):
+            h0[k] = first.get(name.removeprefix("remembered "), 0.0)
+        h, dh = self._loop(x, dx, values, slot, h0)
         return {
             name: Varying(h[k], dict(zip(active, dh[k], strict=True)))
             for k, name in enumerate(self._memory)

@@ -38,8 +38,8 @@ class Criteria:
         decisive: −2 log likelihood, penalised, by which a model of more effects must win, and by
             which a rival may lose; convention (Kass & Raftery, J. Am. Stat. Assoc. 90, 1995: very
             strong evidence).
-        significant: standard errors that an amplitude must be from nothing, and times what is
-            expected that a held-out error may be; convention.
+        significant: standard errors that an amplitude must be from nothing, times what is expected
+            that a held-out error may be, and times what was stated that noise may be; convention.
         near: error over noise up to which a model explains what it was fitted to, and what it was
             not, if the residual has structure; made-up.
         enough: ... up to which a further effect is not claimed, whatever it gains; made-up.

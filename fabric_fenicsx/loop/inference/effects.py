@@ -13,7 +13,17 @@ from typing import Any
 
 from ...inputs.parameters import Parameter
 
-__all__ = ["Effect", "Parameter", "Shape", "Values", "Variant", "of_run", "scaled", "valued"]
+__all__ = [
+    "Effect",
+    "Parameter",
+    "Shape",
+    "Values",
+    "Variant",
+    "of_each_run",
+    "of_run",
+    "scaled",
+    "valued",
+]
 
 Values = Mapping[str, Any]
 
@@ -29,6 +39,7 @@ class Shape:
         value: from the parameters and the variable's share of its reach, in UFL.
         fixed: numbers of the term that are not fitted, by name.
         ends: its values in the fitted readings lie between these shares of the reach.
+        points: shares of the reach that alone mean something, as of runs; none are all.
         also: name of another variable, likewise, which ``value`` takes a share of as well; empty
             of a shape over one variable.
         also_reach: its largest value.
@@ -40,6 +51,7 @@ class Shape:
     value: Callable[..., Any]
     fixed: Mapping[str, Any] = field(default_factory=dict)
     ends: tuple[float, float] = (0.0, 1.0)
+    points: tuple[float, ...] = ()
     also: str = ""
     also_reach: float = 1.0
 
@@ -131,6 +143,13 @@ def of_run(p: Parameter, run: int) -> Parameter:
     """A parameter as that of one run alone, counted from 0; it may have been another run's."""
     name = p.name if p.run is None else p.name.split("_", 1)[1]
     return replace(p, name=f"run{run + 1}_{name}", run=run)
+
+
+def of_each_run(v: Variant, runs: Sequence[int]) -> Variant:
+    """A form with parameters of their own for each run, counted from 0, where it wants them."""
+    if not getattr(v, "each_run", False):
+        return v
+    return replace(v, parameters=tuple(of_run(p, run) for run in runs for p in v.parameters))
 
 
 def valued(given: Any, values: Values) -> Any:

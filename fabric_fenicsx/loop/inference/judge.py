@@ -226,10 +226,14 @@ class Judge:
     def fits(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise, in size, on what it was fitted to.
 
+        Noise of far more than was stated for it is none.
         Structure may be left that is small beside noise; where it is beyond doubt, only what is
         also small beside what the baseline missed: another form of the same effect.
         """
         found = self.misfit(model)
+        if self.given and found.reading > CRITERIA.significant * self.given:
+            # Whoever read the force knows that it is no noise.
+            return False
         used, freedom = model.fit.used, model.fit.freedom
         left = model.fit.rms(used) * float(np.sqrt(used.sum() / freedom))
         if found.whiteness.least < CRITERIA.hopeless_p:

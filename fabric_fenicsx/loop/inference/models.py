@@ -16,7 +16,7 @@ from .noise import Noise, estimated_noise
 from .starts import SMALL, Combination, fit_combinations
 from .variances import Variances
 
-__all__ = ["REFINED_WITHIN", "Models"]
+__all__ = ["REFINED_WITHIN", "Models", "nothing_left"]
 
 #: Scatter of specimens, as a share, that first fits allow for.
 FIRST_SCATTER = 0.1
@@ -164,7 +164,7 @@ class Models:
             for f, own in zip(found, effects, strict=True)
         ]
         # A form of which nothing is left says nothing of its effect.
-        order = sorted(range(len(found)), key=lambda k: (_nothing_left(found[k]), first[k]))
+        order = sorted(range(len(found)), key=lambda k: (nothing_left(found[k]), first[k]))
         sets = [frozenset(own) for own in effects]
         seen: list[frozenset[Effect]] = []
         models = []
@@ -258,9 +258,9 @@ def _simplest_first(models: list[Model]) -> list[Model]:
     return [first, *(m for m in models if m is not first)]
 
 
-def _nothing_left(model: Fit) -> bool:
+def nothing_left(model: Fit) -> bool:
     """Whether some effect of a model has all its amplitudes on a bound at nothing."""
-    return any(
-        all(p.name in model.at_bound and abs(model.values[p.name]) <= SMALL for p in v.amplitudes)
-        for v in model.variants
-    )
+    gone = {n for n in model.at_bound if abs(model.values[n]) <= SMALL}
+    names = [{p.name for p in v.amplitudes} for v in model.variants]
+    # What is never absent has no amplitude.
+    return any(own and own <= gone for own in names)

@@ -19,6 +19,7 @@ nearest. The harder of the two ways, A true and B true, counts.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -170,8 +171,8 @@ def best_tests(
         count: runs wanted.
         draws: of the true model's parameters, beside its fit itself.
     """
-    sides = [_Side(experiment, fits, sigma, draws) for fits in (fits_a, fits_b) if fits]
-    if len(sides) < 2:
+    sides = [_Side(experiment, fits, sigma, draws) for fits in (fits_a, fits_b)]
+    if not all(side.models for side in sides):
         return []
     ranked: list[tuple[float, Proposal, list[list[Foretold]]]] = []
     for proposal, run in further:
@@ -216,7 +217,7 @@ class _Side:
         draws: of parameters, in all.
 
     Attributes:
-        models: the likelier first.
+        models: the likelier first; those with no solution where specimens are alike left out.
         weights: their probabilities by BIC, (n_truths,), of those that may well be true.
     """
 
@@ -233,8 +234,13 @@ class _Side:
         for model in sorted(fits, key=bic):
             values = (f"{value:.2g}" for value in model.values.values())
             places.setdefault((model.variants, *values), model)
-        self.models = [Known(experiment, model, sigma) for model in places.values()]
-        bics = np.array([bic(model) for model in places.values()])
+        self.models: list[Known] = []
+        for model in places.values():
+            with suppress(SolveError):
+                self.models.append(Known(experiment, model, sigma))
+        if not self.models:
+            return
+        bics = np.array([bic(known.fitted) for known in self.models])
         weights = np.exp(-0.5 * (bics - bics[0]))
         weights = weights[: max(int(np.sum(weights > UNLIKELY * weights.sum())), 1)][:TRUTHS]
         self.weights = weights / weights.sum()

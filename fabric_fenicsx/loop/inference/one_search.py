@@ -11,13 +11,13 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis, Verdict
-from .effects import Effect
+from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitting import Fit, fit
 from .judge import Model
@@ -25,8 +25,8 @@ from .models import Models
 from .noise import quantum
 from .notes import errors_beside, noise_source, notes_of
 from .rivals import pairs_of, rivals_of
-from .screen import Screen
-from .starts import Combination, ToFirstOrder, signatures
+from .screen import Screen, Signatures
+from .starts import Combination, Signature, ToFirstOrder, signatures
 
 __all__ = ["Search"]
 
@@ -176,13 +176,8 @@ class Search:
     def _alone(self) -> tuple[list[Candidate], list[list[Model]]]:
         """Candidates by themselves, and models of no effect and of one."""
         self.progress(0.0, "signatures")
-        base = self.models.baseline(self.models.start)
-        expected, _ = self.experiment.predict((), base.values)
-        signs = {
-            effect: {v: signatures(self.experiment, base, expected, v) for v in effect.variants}
-            for effect in self.effects
-        }
-        self.models.base, self._signatures, self.models.forms = base, signs, {}
+        base = self.models.base = self.models.baseline(self.models.start)
+        self._signatures, self.models.forms = self._signed(self.effects), {}
         screen = self._screened()
         levels = [[self.models.refined(self.judge.weighed(base, ()))]]
         if not self.effects:
@@ -196,7 +191,7 @@ class Search:
         tried = screen.most_promising(CRITERIA.terms) if self._screened_first else self.effects
         for k, effect in enumerate(tried):
             self.progress(0.1 + 0.4 * k / len(tried), f"fit {effect.name}")
-            own = [((v, s),) for v, shapes in signs[effect].items() for s in shapes]
+            own = _by_itself(self._signatures[effect])
             found += self.models.fitted(own, starts=2)
             alike += self.models.with_alike_specimens(own)
         # Sizes of fits that allow for specimens and of those that do not are not compared.
@@ -214,28 +209,33 @@ class Search:
 
     def _over_two_variables(self, candidates: list[Candidate]) -> list[Model]:
         """Models of the most promising terms over two variables, which join the candidates."""
-        base, variances = self.models.base, self.models.variances
-        expected, _ = self.experiment.predict((), base.values)
-        signs = {
-            effect: {v: signatures(self.experiment, base, expected, v) for v in effect.variants}
-            for effect in self._of_two
-        }
-        linear = ToFirstOrder(self.experiment, base, variances, CRITERIA.far)
-        screen = Screen(base, linear, signs)
+        signs = self._signed(self._of_two)
+        screen = self._screen(signs)
         tried = screen.most_promising(CRITERIA.products)
         scores = screen.scores(tried)
         candidates += [Candidate(e, *score) for e, score in zip(tried, scores, strict=True)]
         found: list[Fit] = []
         for effect in tried:
-            own = [((v, s),) for v, shapes in signs[effect].items() for s in shapes]
-            found += self.models.fitted(own, starts=1)
+            found += self.models.fitted(_by_itself(signs[effect]), starts=1)
         return self.models.best_refined(self.models.weighed(found))
+
+    def _signed(self, effects: Sequence[Effect]) -> Signatures:
+        """The baseline's sensitivities to each form of some effects."""
+        base = self.models.base
+        alike, _ = self.experiment.predict((), base.values)
+        return {
+            effect: {v: signatures(self.experiment, base, alike, v) for v in effect.variants}
+            for effect in effects
+        }
 
     def _screened(self) -> Screen:
         """All effects to first order about the baseline, with the variances as they are now."""
+        return self._screen(self._signatures)
+
+    def _screen(self, signs: Signatures) -> Screen:
         base, variances = self.models.base, self.models.variances
         linear = ToFirstOrder(self.experiment, base, variances, CRITERIA.far)
-        return Screen(base, linear, self._signatures)
+        return Screen(base, linear, signs)
 
     def _added_to(self, model: Fit) -> list[Combination]:
         """Every form of every other effect beside those of a model, about that model.
@@ -328,6 +328,11 @@ class Search:
         singles = levels[1] if len(levels) > 1 else []
         limit = min((m.criterion for m in singles), default=0.0) + CRITERIA.decisive
         return tuple(dict.fromkeys(m.effects[0].name for m in singles if m.criterion < limit))
+
+
+def _by_itself(forms: Mapping[Variant, Sequence[Signature]]) -> list[Combination]:
+    """Each shape of each form of an effect."""
+    return [((variant, shape),) for variant, shapes in forms.items() for shape in shapes]
 
 
 def _nearest(levels: Sequence[Sequence[Model]]) -> Model:

@@ -10,9 +10,8 @@ The laws are those of mechanics.laws, the same classes that a whole net takes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 from math import inf
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -24,16 +23,16 @@ from scipy.optimize import nnls
 from ...inputs.parameters import Parameter
 from ...mechanics.laws.dashpots import LinearDashpot
 from ...mechanics.laws.springs import PolynomialSpring
-from ...mechanics.scalars import derivative_of
 from ..expressions.marching import Marched, Varying
-from ..inference.effects import Effect, Variant, of_run, scaled
+from ..inference.effects import Effect, Variant, of_each_run, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ..inference.noise import estimated_noise
 from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
-from .records import laid_out, of_a_crossing, typical
+from .recorded_rig import RecordedRig
+from .records import of_a_crossing, runs_before, typical
 
 __all__ = ["CrossheadTest"]
 
@@ -77,12 +76,13 @@ class CrossheadTest:
         self.baseline: tuple[Parameter, ...] = BASELINE
         runs = [(m, run) for m in measurements for run in m.runs]
         motions = [self._motion(m, run) for m, run in runs]
-        self._points, self._place = laid_out(motions)
         self._compiled: dict[Any, Marched] = {} if like is None else like._compiled
+        self._recorded = RecordedRig(motions, self._compiled)
+        self._points = self._recorded.points
         self._set_up(runs)
         known = self._kinematics(self._points, {})
         gamma, rate = (self._shown(known[key].value) for key in ("gamma", "rate"))
-        time = self._at_readings(self._points["time"].value)
+        time = self._recorded.at_readings(self._points["time"].value)
         readings = readings_of(
             measurements,
             np.concatenate([run.columns["force_N"] for _, run in runs]),
@@ -94,6 +94,8 @@ class CrossheadTest:
             usable=np.concatenate([p.certain for p in motions]),
         )
         self.readings = self._named(readings)
+        self._before = runs_before(self.readings)
+        self._recorded.before = self._before["folder"]
         self._leave_out_uncertain(np.concatenate([p.rate_error for p in motions]))
         self._start()
         shares = {
@@ -144,13 +146,17 @@ class CrossheadTest:
         """
         raise NotImplementedError
 
+    def _acting(self, force: Varying) -> Varying:
+        """The force on the rig, where another quantity may be read instead of it."""
+        return force
+
     def _gathered(self, values: Array) -> Array:
         """Sums over the crossings of each run, (n_points, n_runs)."""
         return values
 
     def _shown(self, values: Array) -> Array:
         """Of the crossings of a run the one that is shown, at every reading, (n,)."""
-        return self._at_readings(values)
+        return self._recorded.at_readings(values)
 
     # Data ---------------------------------------------------------------------------------
 
@@ -169,7 +175,7 @@ class CrossheadTest:
         residual = self.readings.observed - J @ k
         noise = self.noise or estimated_noise(residual, self.readings, rows)
         known = self._kinematics(self._points, {})
-        per_speed = self._at_readings(
+        per_speed = self._recorded.at_readings(
             self._gathered(known["factor"].value * known["rate_per_speed"].value)
         )
         # Where nothing is known of the rate the motion has left the reading out itself.
@@ -192,9 +198,6 @@ class CrossheadTest:
             replace(p, starts=(float(value),)) for p, value in zip(self.baseline, k, strict=True)
         )
 
-    def _at_readings(self, values: Array) -> Array:
-        return np.broadcast_to(values, self._points["D"].value.shape)[self._place]
-
     # Model --------------------------------------------------------------------------------
 
     def settle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
@@ -206,9 +209,15 @@ class CrossheadTest:
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """What a term without a formula depends on, at every reading; see Experiment."""
         assert isinstance(variant, FrameVariant)
+        if variant.by_run is not None:
+            return self._recorded.at_readings(self._recorded.each(self._before["specimen"]).value)
         if variant.laws is None:
-            known = self._force(self._points, (), values)
-            return self._at_readings(self._known(known)[variant.of[0]]().value)
+            whole = self._acting(self._force(self._points, (), values))
+            if variant.variable is None:
+                found = self._recorded.known(whole)[variant.of[0]]()
+            else:
+                found = self._recorded.added(variant, "variable", whole, values)
+            return self._recorded.at_readings(found.value)
         key = (variant, "along")
         if key not in self._compiled:
             names = tuple(p.name for p in variant.parameters) + variant.of_baseline
@@ -218,8 +227,9 @@ class CrossheadTest:
             history = {f"0 {n}": value for n, value in law.history(crossing).items()}
             variable = law.variable_at(crossing)
             self._compiled[key] = marched.define({"variable": variable}, history)
-        found = self._compiled[key](self._kinematics(self._points, {}), values)["variable"]
-        return self._shown(found.value)
+        known, first = self._kinematics(self._points, {}), self._from_earlier_runs(variant)
+        variables = self._compiled[key](known, values, first)
+        return self._shown(variables["variable"].value)
 
     def _ranges(self) -> dict[str, float]:
         """Largest values in the fitted readings of what terms without a formula depend on.
@@ -235,15 +245,15 @@ class CrossheadTest:
         change = np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0, prepend=0.0)
         change[0] = 0.0
         force = float(np.abs(self.readings.observed[rows]).max())
-        acceleration = self._per_second(self._points["D_rate"]).value
+        acceleration = self._recorded.per_second(self._points["D_rate"]).value
         return {
             "angle": most(self._gamma),
             "rate": most(self._rate),
             "path": most(self._shown(np.cumsum(np.abs(change), axis=0))),
-            "time": most(self._at_readings(time - time[0])),
-            "displacement": most(self._at_readings(D)),
-            "speed": most(self._at_readings(speed)),
-            "acceleration": most(self._at_readings(acceleration)),
+            "time": most(self._recorded.at_readings(time - time[0])),
+            "displacement": most(self._recorded.at_readings(D)),
+            "speed": most(self._recorded.at_readings(speed)),
+            "acceleration": most(self._recorded.at_readings(acceleration)),
             "force": force,
             "force_rate": force / max(float(np.median(time[-1])), 1e-9),
         }
@@ -252,8 +262,8 @@ class CrossheadTest:
         """Between which shares of their largest sizes signed variables of terms are."""
         rows = self.readings.fit & self.readings.first
         signed = {
-            "displacement": self._at_readings(self._points["D"].value)[rows],
-            "speed": self._at_readings(self._points["D_rate"].value)[rows],
+            "displacement": self._recorded.at_readings(self._points["D"].value)[rows],
+            "speed": self._recorded.at_readings(self._points["D_rate"].value)[rows],
             "force": self.readings.observed[rows],
         }
 
@@ -287,52 +297,39 @@ class CrossheadTest:
         """The same with specimens that are alike."""
         mine = [v for v in variants if isinstance(v, FrameVariant)]
         travels = [v for v in mine if v.travel is not None]
-        travel = self._travel(travels[0] if travels else None, values)
+        travel = self._recorded.travel(travels[0] if travels else None, values)
         whole = self._force(travel, mine, values)
         for v in mine:
             if v.added_travel is not None:
                 # The force with the travel as it would be without: what is added is little.
-                ahead = self._added(v, "travel", whole, values)
-                travel = self._moved(travel, ahead)
+                ahead = self._recorded.added(v, "travel", self._acting(whole), values)
+                travel = self._recorded.moved(travel, ahead)
                 whole = self._force(travel, mine, values)
         zeros: list[tuple[Flags, Array]] = []
         cell = Varying(np.asarray(self._on_the_load_cell))
         read = whole
         for v in mine:
             if v.added_reading is not None:
-                read += cell * self._added(v, "reading", whole, values)
+                read += cell * self._recorded.added(v, "reading", self._acting(whole), values)
             if v.reading is not None and v.each_run:
                 added, own_zeros = self._each_run(v, values, read.value)
                 read += cell * added
                 zeros += own_zeros
             elif v.reading is not None:
-                read += cell * self._reading(v, values)
+                read += cell * self._recorded.reading(v, values)
         force, slopes = read.value, read.slopes
         names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
-        zero = np.zeros(len(self._place[0]))
+        zero = np.zeros(len(self._recorded.place[0]))
         found = {
-            name: self._at_readings(slopes[name]) if name in slopes else zero for name in names
+            name: self._recorded.at_readings(slopes[name]) if name in slopes else zero
+            for name in names
         }
         for rows, J in zeros:
             # What a zero taken from the readings makes up for.
             for name, slope in found.items():
                 found[name] = slope.copy()
                 found[name][rows] -= J @ np.linalg.lstsq(J, slope[rows], rcond=None)[0]
-        return self._at_readings(force), found
-
-    def _travel(self, variant: FrameVariant | None, values: Mapping[str, float]) -> Any:
-        """True displacement of the frame, and its rate."""
-        if variant is None or variant.travel is None:
-            return self._points
-        key = (variant, "travel")
-        if key not in self._compiled:
-            marched = Marched(("D", "D_rate"), tuple(p.name for p in variant.parameters))
-            past = marched.remembered("D") if variant.remembers_travel else None
-            true = variant.travel(marched.at, marched.at["D"], past)
-            rate = derivative_of(true, marched.at["D"]) * marched.at["D_rate"]
-            history = {"D": true} if variant.remembers_travel else {}
-            self._compiled[key] = marched.define({"D": true, "D_rate": rate}, history)
-        return self._compiled[key](self._points, values)
+        return self._recorded.at_readings(force), found
 
     def _force(
         self, travel: Any, variants: Sequence[FrameVariant], values: Mapping[str, float]
@@ -349,69 +346,6 @@ class CrossheadTest:
             self._gathered(work.value),
             {p: self._gathered(np.broadcast_to(slope, shape)) for p, slope in work.slopes.items()},
         )
-
-    def _added(
-        self, variant: FrameVariant, to: str, force: Varying, values: Mapping[str, float]
-    ) -> Varying:
-        """What a form adds to the reading [N] or to the travel [mm]."""
-        key = (variant, to)
-        if key not in self._compiled:
-            expression = variant.added_reading if to == "reading" else variant.added_travel
-            assert expression is not None
-            marched = Marched(variant.of, tuple(p.name for p in variant.parameters))
-            self._compiled[key] = marched.define({"added": expression(marched.at, marched.at)}, {})
-        marched, known = self._compiled[key], self._known(force)
-        return marched({name: known[name]() for name in marched.inputs}, values)["added"]
-
-    def _known(self, force: Varying) -> dict[str, Callable[[], Varying]]:
-        """What is known at a reading, by the names of FrameVariant.of, where it is wanted."""
-        return {
-            "time": self._since_start,
-            "displacement": lambda: self._points["D"],
-            "speed": lambda: self._points["D_rate"],
-            "acceleration": lambda: self._per_second(self._points["D_rate"]),
-            "force": lambda: force,
-            "force_rate": lambda: self._per_second(force),
-        }
-
-    def _since_start(self) -> Varying:
-        """Time in each run [s]."""
-        time = self._points["time"].value
-        return Varying(time - time[0])
-
-    def _per_second(self, x: Varying) -> Varying:
-        """How fast something changes along each record: differences of second order within it."""
-        step, weights = self._differences
-
-        def rate(values: Array) -> Array:
-            values = np.broadcast_to(values, (len(step) + 1, step.shape[1]))
-            found = np.empty(values.shape)
-            places = values[:-2], values[1:-1], values[2:]
-            found[1:-1] = sum(w * v for w, v in zip(weights, places, strict=True))
-            found[0] = (values[1] - values[0]) / step[0]
-            found[-1] = (values[-1] - values[-2]) / step[-1]
-            return found
-
-        return Varying(rate(x.value), {p: rate(slope) for p, slope in x.slopes.items()})
-
-    @cached_property
-    def _differences(self) -> tuple[Array, tuple[Array, Array, Array]]:
-        """Steps of time, and weights of a value and its neighbours in how fast it changes."""
-        step = np.diff(self._points["time"].value, axis=0)
-        before, after = step[:-1], step[1:]
-        both = before + after
-        return step, (
-            -after / (before * both),
-            (after - before) / (before * after),
-            before / (after * both),
-        )
-
-    def _moved(self, travel: Any, ahead: Varying) -> dict[str, Varying]:
-        """A travel with what is added to it, and its rate."""
-        return {
-            "D": travel["D"] + ahead,
-            "D_rate": travel["D_rate"] + self._per_second(ahead),
-        }
 
     def _moment(
         self, variant: FrameVariant | None, known: dict[str, Varying], values: Mapping[str, float]
@@ -439,27 +373,30 @@ class CrossheadTest:
                 moment = moment + law.moment(crossing)
                 history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
             self._compiled[key] = marched.define({"moment": moment}, history)
-        return self._compiled[key](known, values)["moment"]
+        first = {} if variant is None else self._from_earlier_runs(variant)
+        moment = self._compiled[key](known, values, first)["moment"]
+        if variant is None or variant.by_run is None:
+            return moment
+        return moment * self._by_run(variant, values)
 
-    def _reading(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
-        key = (variant, "reading")
+    def _from_earlier_runs(self, variant: FrameVariant) -> dict[str, Array]:
+        """What a form's law remembers where a run begins, by name; see Marched."""
+        return {}
+
+    def _by_run(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
+        """The factor of a form's moments that goes by the run."""
+        key = (variant, "by run")
         if key not in self._compiled:
-            assert variant.reading is not None
-            marched = Marched(("time",), tuple(p.name for p in variant.parameters))
-            added = variant.reading(marched.at, marched.at["time"])
-            self._compiled[key] = marched.define({"force": added}, {})
-        return self._compiled[key](self._points, values)["force"]
+            assert variant.by_run is not None
+            marched = Marched(("run",), tuple(p.name for p in variant.parameters))
+            factor = variant.by_run(marched.at, marched.at["run"])
+            self._compiled[key] = marched.define({"factor": factor}, {})
+        run = self._recorded.each(self._before["specimen"])
+        return self._compiled[key]({"run": run}, values)["factor"]
 
     def _with_runs(self, effect: Effect) -> Effect:
         """Parameters of their own for each run that is fitted, where a form wants them."""
-        runs = np.unique(self.readings.run[self.readings.fit & self.readings.first])
-
-        def expanded(v: Variant) -> Variant:
-            if not (isinstance(v, FrameVariant) and v.each_run):
-                return v
-            own = tuple(of_run(p, int(run)) for run in runs for p in v.parameters)
-            return replace(v, parameters=own)
-
+        runs = np.unique(self.readings.run[self.readings.fit & self.readings.first]).tolist()
         each = [v for v in effect.variants if getattr(v, "each_run", False)]
         shared = [v for v in effect.variants if v not in each]
         if len(np.unique(self.readings.run[self.readings.first])) == 1:
@@ -467,7 +404,7 @@ class CrossheadTest:
         elif each and len(runs) == 1:
             # One fitted run cannot tell the two apart: nothing is claimed of the other runs.
             shared = [v for v in shared if getattr(v, "reading", None) is None]
-        return replace(effect, variants=tuple(expanded(v) for v in (*shared, *each)))
+        return replace(effect, variants=tuple(of_each_run(v, runs) for v in (*shared, *each)))
 
     def _each_run(
         self, variant: FrameVariant, values: Mapping[str, float], force: Array
@@ -489,7 +426,7 @@ class CrossheadTest:
         columns = added.slopes
         shape = self._points["time"].value.shape
         total, found = np.zeros(shape), {}
-        left = self.readings.observed - self._at_readings(force)
+        left = self.readings.observed - self._recorded.at_readings(force)
         for run in np.flatnonzero(np.broadcast_to(self._on_the_load_cell, shape[1])):
             rows = self.readings.run == run
             own = {n: np.broadcast_to(c, shape)[:, run] for n, c in columns.items()}
@@ -502,7 +439,10 @@ class CrossheadTest:
             else:
                 rows = rows & self.readings.usable
                 J = np.column_stack(
-                    [self._at_readings(np.broadcast_to(c, shape))[rows] for c in columns.values()]
+                    [
+                        self._recorded.at_readings(np.broadcast_to(c, shape))[rows]
+                        for c in columns.values()
+                    ]
                 )
                 zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
                 zeros.append((rows, J))

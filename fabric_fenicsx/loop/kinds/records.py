@@ -11,9 +11,10 @@ import numpy.typing as npt
 
 from ...mechanics.laws.law import Crossing
 from ..expressions.marching import Marched, Varying
+from ..inference.experiment import Readings
 from .picture_frame.motion import Motion
 
-__all__ = ["laid_out", "of_a_crossing", "shifted", "typical"]
+__all__ = ["laid_out", "of_a_crossing", "runs_before", "shifted", "typical"]
 
 Array = npt.NDArray[np.float64]
 
@@ -51,6 +52,16 @@ def laid_out(
         "per_time": Varying(1.0 / step),
     }
     return points, tuple(np.concatenate(part) for part in zip(*places, strict=True))
+
+
+def runs_before(readings: Readings) -> dict[str, Array]:
+    """How many runs were before each, in its "folder" and of its "specimen", (n_runs,) each."""
+    first = np.unique(readings.run, return_index=True)[1]
+    found = {}
+    for name, numbers in (("folder", readings.folder), ("specimen", readings.specimen)):
+        own = numbers[first]
+        found[name] = np.array([np.sum(own[:k] == own[k]) for k in range(len(own))], dtype=float)
+    return found
 
 
 def typical(rate: Array) -> float:

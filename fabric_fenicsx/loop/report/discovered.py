@@ -65,9 +65,6 @@ def discovered_terms(d: Diagnosis, first: int = 1) -> list[Discovered]:
     found: list[Discovered] = []
     for effect in (e for e in d.effects if not e.listed):
         variant = next(v for v in d.final.variants if v in effect.variants)
-        if variant.shape is None:
-            # A number of each run is no shape, and no other data have these runs.
-            continue
         table = _shape_table(d, variant)
         about = effect.acts_on.replace("_", " ") + ": "
         if table.columns[1].startswith("share_of_"):
@@ -82,7 +79,7 @@ def _shape_table(d: Diagnosis, variant: Variant) -> pd.DataFrame:
     """A term's shape over its variable, as far as that was reached."""
     shape = variant.shape
     assert shape is not None
-    x = np.linspace(*shape.ends, POINTS)
+    x = np.array(shape.points) if shape.points else np.linspace(*shape.ends, POINTS)
     at = {"x": x}
     columns = {shape.x: shape.reach * x}
     if shape.also:

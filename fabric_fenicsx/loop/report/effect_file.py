@@ -42,7 +42,7 @@ class {class_name}(ff.CrossingLaw):
             "{name}",
             "as found",
             ({{"amount": ff.Parameter("{name}_amount", amplitude=True)}},),
-            meaning="{about}",
+            meaning="{about}",{carried}
         ),
     )
 
@@ -67,28 +67,18 @@ SHAPE = {{
 }}
 
 
-def added(p, at):
-    """What is added: {y}."""
-    x = max_value(min_value(at["{variable}"] / REACH, 1), -1)
-    return p["{name}_amount"] * {value}
+def added(p, x):
+    """What is added, {y}, at {x} = x."""
+    share = max_value(min_value(x / REACH, 1), -1)
+    return p["{name}_amount"] * ({constant!r} + ff.shape_of(x=share, **SHAPE))
 
 
-EFFECTS = [
-    ff.Effect(
-        "{name}",
-        "{test}",
-        "{about}",
-        (ff.FrameVariant("as found", (AMOUNT,), of={of!r}, added_{acts_on}=added),),
-        of_fabric=False,
-    )
-]
+FOUND = {found}
+EFFECTS = [ff.Effect("{name}", "{test}", "{about}", (FOUND,), of_fabric=False)]
 '''
 
-VALUE = "({constant!r} + ff.shape_of(x=x, **SHAPE))"
-AGAINST_THE_MOTION = """(
-        ({constant!r} + ff.shape_of(x=x, **SHAPE))
-        * ff.shape_of("sign", (1.0,), at["speed"], width={slow!r})
-    )"""
+FOUND_OF_THE_RIG = 'ff.of_the_rig("as found", (AMOUNT,), "{acts_on}", "{variable}", added{options})'
+FOUND_OF_THE_RUN = 'ff.of_the_run("as found", (AMOUNT,), "{base}", added)'
 
 OF_A_STRIP = """
 import fabric_fenicsx as ff
@@ -102,6 +92,15 @@ EFFECTS = [
         values={values!r},
     )
 ]
+"""
+
+
+OF_EACH_RUN = """
+import fabric_fenicsx as ff
+
+ZERO = ff.Parameter("{name}_zero_mm", amplitude=True, meaning="of a run; no other has the same")
+FOUND = ff.StripVariant("zero", (ZERO,), each_run=True)
+EFFECTS = [ff.Effect("{name}", "cantilever", "{about}", (FOUND,), of_fabric=False)]
 """
 
 
@@ -126,6 +125,8 @@ def effect_file(term: Discovered, titles: str) -> str:
         "y": shape.y,
         "acts_on": term.effect.acts_on,
     }
+    if shape.points:
+        return (HEAD + OF_EACH_RUN).format(**words)
     if term.effect.test == "cantilever":
         values = {p.name: term.values[p.name] for p in term.variant.parameters}
         ranges = shape.fixed["ranges"]
@@ -136,14 +137,16 @@ def effect_file(term: Discovered, titles: str) -> str:
         if numbers["base"] in OF_ELASTIC:
             numbers |= {"k1": term.values["k1_N"], "k3": term.values["k3_N"]}
         lines = "\n".join(f"    {name}={value!r}," for name, value in numbers.items())
+        carried: str = getattr(term.variant, "carried", "")
+        words["carried"] = f'\n            carried="{carried}",' if carried else ""
         return (HEAD + LAW).format(numbers=lines, **words)
-    numbers["kind"], variable = numbers.pop("shape"), numbers.pop("variable")
-    constant = numbers.pop("constant", 0.0)
-    value, of = VALUE.format(constant=constant), [variable]
-    if "slow" in numbers:
-        slow = numbers.pop("slow")
-        value = AGAINST_THE_MOTION.format(constant=constant, slow=slow)
-        of = [variable, "speed"]
+    options = {key: numbers.pop(key) for key in ("memory", "turning", "slow") if key in numbers}
+    if "of" in numbers:
+        words["found"] = FOUND_OF_THE_RUN.format(base=numbers.pop("of"))
+    else:
+        more = "".join(f", {key}={value!r}" for key, value in options.items())
+        rig = {"variable": numbers.pop("variable"), "options": more, **words}
+        words["found"] = FOUND_OF_THE_RIG.format(**rig)
+    numbers["kind"], constant = numbers.pop("shape"), numbers.pop("constant", 0.0)
     lines = "\n".join(f"    {name!r}: {value!r}," for name, value in numbers.items())
-    rig = {"variable": variable, "value": value, "of": tuple(of)}
-    return (HEAD + OF_THE_RIG).format(numbers=lines, **rig, **words)
+    return (HEAD + OF_THE_RIG).format(numbers=lines, constant=constant, **words)

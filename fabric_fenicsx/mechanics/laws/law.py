@@ -156,6 +156,8 @@ class Form:
             Amplitudes come first.
         meaning: of an effect that nobody has described yet, one line.
         rank: forms come in this order; `synthesise` takes the first where none is named.
+        carried: what its memory "variable" has from a specimen's earlier runs, "path" or
+            "largest_angle"; by default each run begins anew.
     """
 
     effect: str
@@ -163,6 +165,7 @@ class Form:
     instances: tuple[Mapping[str, Any], ...]
     meaning: str = ""
     rank: int = 0
+    carried: str = ""
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -12,7 +12,7 @@ from ufl import conditional, cos, exp, ge, gt, ln, lt, max_value, min_value, sin
 from ...inputs.groups import NotNegative, Positive
 from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, size_of
 
-__all__ = ["VARIABLES", "ShapedLaw", "product_of", "shape_of"]
+__all__ = ["VARIABLES", "ShapedLaw", "product_of", "recent", "shape_of"]
 
 Variable = Literal[
     "angle",
@@ -47,14 +47,21 @@ def _each(at: Crossing, numbers: Sequence[Any]) -> list[Any]:
     return [known[k] for k in range(len(numbers))]
 
 
-def _fading(at: Crossing, memory: Any) -> Any:
-    """What is left of a memory after the step, exp(−Δt/τ)."""
-    return exp(-1 / (at.per_time * memory))
+def _kept(per_time: Any, memory: Any) -> Any:
+    """What is left of a memory after a step, exp(−Δt/τ)."""
+    return exp(-1 / (per_time * memory))
 
 
-def _recent(at: Crossing, x: Any, past: Any, memory: Any) -> Any:
-    """Mean of x over the last τ, the latest counting most: τ ds/dt = x − s."""
-    kept = _fading(at, memory)
+def recent(x: Any, past: Any, per_time: Any, memory: Any) -> Any:
+    """Mean of x over the last τ, the latest counting most: τ ds/dt = x − s.
+
+    Args:
+        x: at the end of the step.
+        past: s before it.
+        per_time: 1/Δt [1/s].
+        memory: τ [s].
+    """
+    kept = _kept(per_time, memory)
     return kept * past + (1 - kept) * x
 
 
@@ -77,9 +84,11 @@ VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
     "path": lambda at, past, memory: past + size_of(at.change),
     "time": lambda at, past, memory: past + 1 / at.per_time,
     "unloading": lambda at, past, memory: _unloading(at, past),
-    "recent_angle": lambda at, past, memory: _recent(at, at.size, past, memory),
-    "recent_largest_angle": lambda at, past, memory: max_value(past * _fading(at, memory), at.size),
-    "recent_rate": lambda at, past, memory: _recent(at, size_of(at.rate), past, memory),
+    "recent_angle": lambda at, past, memory: recent(at.size, past, at.per_time, memory),
+    "recent_largest_angle": lambda at, past, memory: max_value(
+        past * _kept(at.per_time, memory), at.size
+    ),
+    "recent_rate": lambda at, past, memory: recent(size_of(at.rate), past, at.per_time, memory),
 }
 """What a factor may depend on, from the crossing, its value at the step before, and τ [s].
 

@@ -15,7 +15,7 @@ Crossings that go alike are taken together.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -103,7 +103,7 @@ class BiasExtension(CrossheadTest):
 
         Each of them is then a curve of the angle, whatever else it depends on.
         """
-        speed = self._at_readings(self._points["D_rate"].value)[self.readings.fit]
+        speed = self._recorded.at_readings(self._points["D_rate"].value)[self.readings.fit]
         if np.ptp(speed) > SAME_RATE * float(np.abs(speed).max()):
             return frozenset()
         every = (*self.effects, *self.terms)
@@ -150,7 +150,7 @@ class BiasExtension(CrossheadTest):
             [way.force(D[:, r], back[:, r], curve) for r, way in enumerate(solved.ways)], axis=1
         )
         rows = self.readings.usable & self.readings.first
-        expected, travel = (self._at_readings(values)[rows] for values in (force, D))
+        expected, travel = (self._recorded.at_readings(values)[rows] for values in (force, D))
         furthest = self._furthest[self.readings.run[rows]]
         return foretold(expected, self.readings.observed[rows], travel, furthest)
 
@@ -197,7 +197,7 @@ class BiasExtension(CrossheadTest):
         self._reached /= float(self._reached @ first.curve.moments)
 
     def _named(self, readings: Readings) -> Readings:
-        along = {"displacement [mm]": self._at_readings(self._points["D"].value)}
+        along = {"displacement [mm]": self._recorded.at_readings(self._points["D"].value)}
         found = replace(readings, covariates={**along, **readings.covariates})
         return self._together.named(found)
 
@@ -386,7 +386,7 @@ class BiasExtension(CrossheadTest):
 
     def _shown(self, values: Array) -> Array:
         points, runs = self._points["D"].value.shape
-        return self._at_readings(values.reshape(points, runs, GROUPS)[:, :, -1])
+        return self._recorded.at_readings(values.reshape(points, runs, GROUPS)[:, :, -1])
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]
@@ -445,9 +445,9 @@ class BiasExtension(CrossheadTest):
             },
         )
 
-    def _known(self, force: Varying) -> dict[str, Callable[[], Varying]]:
+    def _acting(self, force: Varying) -> Varying:
         """The force of the strip also where its angle is read."""
-        return super()._known(self._pull)
+        return self._pull
 
     def _correction(self, variants: Sequence[Variant], travel: Any, quantity: Quantity) -> Varying:
         """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
@@ -459,7 +459,7 @@ class BiasExtension(CrossheadTest):
         self._mixture = self._mixed(variants, values)
         middle = of_ways(self._mixture, self._points["D"], self._back, "middle")
         middle += self._correction(variants, self._points, "middle")
-        return self._at_readings(np.degrees(middle.value))
+        return self._recorded.at_readings(np.degrees(middle.value))
 
     @property
     def notes(self) -> list[str]:  # type: ignore[override]

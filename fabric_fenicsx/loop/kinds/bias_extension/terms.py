@@ -10,7 +10,8 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from ...inference.effects import Effect
-from ..picture_frame.terms import Ends, terms
+from ..picture_frame.shapes import Ends
+from ..picture_frame.terms import terms
 
 __all__ = ["strip_terms"]
 

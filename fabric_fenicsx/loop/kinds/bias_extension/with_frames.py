@@ -13,7 +13,7 @@ they say differently is part of the uncertainty.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, product
@@ -27,7 +27,7 @@ from ...inference.diagnosis import Diagnosis, Joined
 from ...inference.effects import Effect, Variant
 from ...inference.fitting import Fit, groups_of
 from ...inference.judge import Judge
-from ...inference.starts import SMALL
+from ...inference.models import nothing_left
 from ...inference.variances import Variances
 from ...measurement.schema import Measurement
 from ..picture_frame.model import PictureFrame
@@ -195,7 +195,7 @@ def _models(
     d: Diagnosis,
     form: FrameVariant,
     names: Sequence[str] | None,
-) -> Iterator[tuple[tuple[Effect, ...], Settled]]:
+) -> list[tuple[tuple[Effect, ...], Settled]]:
     """With none of what lets a strip lengthen without shear, with each, and with both.
 
     Of each the form that fits best; both begin where the better of them ended, with little of the
@@ -215,16 +215,10 @@ def _models(
                 start = {little.name: LITTLE * other.values[little.name], **better.values}
                 sets += [((*better.variants, other.variants[-1]), start)]
             fits = [_fitted(anew, judge, d, forms, start) for forms, start in sets]
-            done = [model for model in fits if model is not None and _of_all(model.fit)]
+            done = [model for model in fits if model is not None and not nothing_left(model.fit)]
             if done:
                 found[effects] = min(done, key=_objective)
-    yield from found.items()
-
-
-def _of_all(model: Fit) -> bool:
-    """Whether something is left of each effect of a model."""
-    names = [p.name for v in model.variants for p in v.amplitudes]
-    return not any(n in model.at_bound and abs(model.values[n]) <= SMALL for n in names)
+    return list(found.items())
 
 
 def _objective(found: Settled) -> float:
@@ -271,12 +265,12 @@ def _fitted(
 def _weighed(
     anew: CentredBiasExtension,
     judge: Judge,
-    found: Iterable[tuple[tuple[Effect, ...], Settled]],
+    found: Sequence[tuple[tuple[Effect, ...], Settled]],
 ) -> list[Joined]:
     """Models with what they foretell, the best first."""
-    first, every = anew.readings.first, list(found)
+    first = anew.readings.first
     errors, fits, sure = [], list[Fit](), []
-    for _, one in every:
+    for _, one in found:
         several = len(np.unique(anew.readings.run[one.fit.used & first])) > 1
         off, converged = left_out(anew, one.fit) if several else (np.zeros(0), True)
         fits.append(one.search.whole(one.fit))
@@ -297,7 +291,7 @@ def _weighed(
             one.rounds,
             sure[k],
         )
-        for k, (effects, one) in enumerate(every)
+        for k, (effects, one) in enumerate(found)
     ]
     return sorted(models, key=lambda m: m.left_out)
 

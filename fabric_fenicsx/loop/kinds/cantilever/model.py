@@ -15,7 +15,7 @@ t the tangent of the slope of a smooth line through the readings, r the scatter 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -26,7 +26,7 @@ from scipy.interpolate import CubicSpline
 
 from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, Parameter, Variant, scaled
+from ...inference.effects import Effect, Parameter, Variant, of_each_run, scaled
 from ...inference.experiment import NO_DEVIATIONS, Deviations, Law
 from ...measurement.readings import common_noise, readings_of, specimens_of
 from ...measurement.schema import Measurement
@@ -109,7 +109,7 @@ class Cantilever:
     notes = ()
     one_curve = None
     curves_only = False
-    terms_are_rivals = False
+    terms_are_rivals = True
     # A camera that is turned sees a strip that is tilted, but for how that bends.
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType(
         {"clamp_tilt": ("reading_of_distance",)}
@@ -156,7 +156,11 @@ class Cantilever:
         )
         self._largest_curvature, self._largest_moment = curvature, moment
         shares = {"curvature": curvature, "moment": moment}
-        self.effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
+        runs = np.unique(self._run[self.readings.fit]).tolist()
+        effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
+        self.effects = [
+            replace(e, variants=tuple(of_each_run(v, runs) for v in e.variants)) for e in effects
+        ]
 
     @cached_property
     def terms(self) -> list[Effect]:
@@ -311,8 +315,9 @@ class Cantilever:
             "distance_mm": self._distance,
             "from_the_clamp_mm": np.hypot(self._distance, self._observed),
             "height_mm": np.abs(self._observed),
+            "run": self._run + 1.0,
         }
-        # Of the curvature there are no readings, nor of the number of a run.
+        # Of the curvature there are no readings.
         return known.get(variant.shape.x if variant.shape else "", arc)
 
     def predict(

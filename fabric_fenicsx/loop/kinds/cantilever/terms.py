@@ -21,7 +21,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from ufl import exp, max_value, min_value
+from ufl import conditional, exp, lt, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.bending_laws import TabulatedBending
@@ -43,8 +43,9 @@ DECAYS = (0.05, 0.2)
 #: Where flexibility is as without a term: about the middle of where strips bend, so that B is
 #: the stiffness there.
 MIDDLE = 0.2
-#: No coefficient is larger: a moment or a weight that is so many times another is none.
-LARGEST = 10.0
+#: No coefficient is larger: a moment or a weight that is so many times another is none. But a
+#: bead at the end of a strip, whose weight is all in little of it, is.
+LARGEST, HEAVIEST = 10.0, 100.0
 #: Curvatures by which a moment is half way to what it is at large ones, as shares of the largest.
 HALF_WAY = (0.1, 0.6)
 #: Places are seen within this many times the largest reading.
@@ -163,7 +164,8 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         )
         for label, parameters, g in _splines(name, SPLINES)
     ]
-    yield _term(name, "any odd law of the curvature", "bending_moment", ("curvature",), forms)
+    about, of = "any odd law of the curvature", ("nonlinear_bending",)
+    yield _term(name, about, "bending_moment", ("curvature",), forms, of)
 
     for acts_on, unit, about in (
         ("rest_curvature", bend, "curvature of the unloaded strip"),
@@ -182,7 +184,9 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
                 partial(_of_place, unit, g, end, longest),
             )
             for end in ENDS
-            for label, parameters, g in _along_the_strip(name, end, constant=constant)
+            for label, parameters, g in _along_the_strip(
+                name, end, constant=constant, most=LARGEST if constant else HEAVIEST
+            )
         ]
         yield _term(name, f"{about} that varies along the strip", acts_on, ("arc_length",), forms)
         name = f"{acts_on}_of_length"
@@ -320,8 +324,18 @@ def _of_the_run(runs: Sequence[int]) -> Iterator[Effect]:
     if len(runs) > 1:
         name = "reading_of_run"
         zero = Parameter(f"{name}_zero_mm", amplitude=True)
-        forms = [StripVariant("zero", tuple(of_run(zero, k) for k in runs), each_run=True)]
+        each = tuple(of_run(zero, k) for k in runs)
+        last = max(runs) + 1.0
+        value, points = partial(_of_its_run, each, last), tuple((k + 1) / last for k in runs)
+        shape = Shape("run", "height_mm", last, value, points=points)
+        forms = [StripVariant("zero", each, shape=shape, each_run=True)]
         yield _term(name, "a zero of the heights in each run", "reading", ("run",), forms)
+
+
+def _of_its_run(each: Sequence[Parameter], last: float, p: Values, x: Any) -> Any:
+    """The zero of the run that has the number x times the last one's, counted from 1."""
+    own = ((q.run + 1, p[q.name]) for q in each if q.run is not None)
+    return sum(conditional(lt(abs(x * last - number), 0.5), zero, 0.0) for number, zero in own)
 
 
 def _higher(
@@ -341,7 +355,12 @@ def _radial(names: tuple[str, str], longest: float, p: Values, at: Values) -> tu
 
 
 def _term(
-    name: str, about: str, acts_on: str, depends_on: tuple[str, ...], forms: Iterable[StripVariant]
+    name: str,
+    about: str,
+    acts_on: str,
+    depends_on: tuple[str, ...],
+    forms: Iterable[StripVariant],
+    general_form_of: tuple[str, ...] = (),
 ) -> Effect:
     return Effect(
         name,
@@ -351,6 +370,7 @@ def _term(
         of_fabric=acts_on == "bending_moment",
         acts_on=acts_on,
         depends_on=depends_on,
+        general_form_of=general_form_of,
     )
 
 
@@ -373,12 +393,15 @@ def _splines(name: str, counts: Iterable[int], *, constant: bool = False) -> Ite
         yield f"{count} coefficients" if count > 1 else "linear", (*zero, *own), spline
 
 
-def _along_the_strip(name: str, end: str, *, constant: bool = False) -> Iterator[Drawn]:
+def _along_the_strip(
+    name: str, end: str, *, constant: bool = False, most: float = LARGEST
+) -> Iterator[Drawn]:
     """Shapes over a place that is counted from one end."""
     yield from _splines(name, SPLINES if end == "clamp" else SPLINES[:1], constant=constant)
     one = _coefficient(f"{name}_1")
     decay = Parameter(f"{name}_width", DECAYS, 0.02, 1.0)
-    yield "decay", (one, decay), lambda p, x: p[one.name] * exp(-x / p[decay.name])
+    much = replace(one, lower=-LARGEST, upper=most) if end != "clamp" else one
+    yield "decay", (much, decay), lambda p, x: p[one.name] * exp(-x / p[decay.name])
     if end != "clamp":
         # Nothing much bends there: a place of its own would hardly be known.
         return

@@ -31,6 +31,7 @@ from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
 from .products import products
 from .terms import terms
+from .variant import FrameVariant
 
 __all__ = ["PictureFrame"]
 
@@ -77,6 +78,12 @@ class PictureFrame(CrossheadTest):
         if self.curves_only:
             return []
         ranges = self._ranges()
+        fitted = np.unique(self.readings.run[self.readings.fit])
+        ranges |= {f"run_of_{name}": max(n[fitted]) for name, n in self._before.items()}
+        if ranges["run_of_specimen"]:
+            along = np.abs(np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0))
+            whole = self._past_of_specimens["path"] + along.sum(axis=0)
+            ranges["path_of_specimen"] = float(whole[fitted].max())
         return [*terms(ranges, self._ends()), *products(ranges)]
 
     @property
@@ -93,15 +100,44 @@ class PictureFrame(CrossheadTest):
     def shear(self) -> tuple[Array, Array]:
         """Angle [rad] and force over moment per area [mm] at every reading, (n,) each."""
         known = self._kinematics(self._points, {})
-        return self._at_readings(known["gamma"].value), self._at_readings(known["factor"].value)
+        return self._recorded.at_readings(known["gamma"].value), self._recorded.at_readings(
+            known["factor"].value
+        )
 
     def _steady(self, rows: npt.NDArray[np.bool_]) -> bool:
         """Whether some readings are of one way at one speed of the crosshead or of the angle."""
-        rate = self._at_readings(self._kinematics(self._points, {})["rate"].value)[rows]
-        speed = self._at_readings(self._points["D_rate"].value)[rows]
+        rate = self._recorded.at_readings(self._kinematics(self._points, {})["rate"].value)[rows]
+        speed = self._recorded.at_readings(self._points["D_rate"].value)[rows]
         return len(rate) > 0 and any(
             np.ptp(v) <= SAME_RATE * float(np.abs(v).max(initial=0.0)) for v in (speed, rate)
         )
+
+    def _from_earlier_runs(self, variant: FrameVariant) -> dict[str, Array]:
+        if not variant.carried:
+            return {}
+        known = self._past_of_specimens
+        named = {"variable": variant.carried, "largest": "largest_angle", "side": "side"}
+        # The one law of the form counts from 0.
+        return {f"0 {name}": known[of] for name, of in named.items()}
+
+    @cached_property
+    def _past_of_specimens(self) -> dict[str, Array]:
+        """What a specimen went through in earlier runs, (n_runs,) each.
+
+        By name, its path and its largest angle [rad], and the sign of the angle there.
+        """
+        readings = self.readings
+        gamma = self._kinematics(self._points, {})["gamma"].value
+        paths = np.abs(np.diff(gamma, axis=0)).sum(axis=0)
+        peaks = gamma[np.abs(gamma).argmax(axis=0), np.arange(gamma.shape[1])]
+        specimen = readings.specimen[np.unique(readings.run, return_index=True)[1]]
+        path, peak = np.zeros_like(paths), np.zeros_like(paths)
+        for k, own in enumerate(specimen):
+            earlier = np.flatnonzero(specimen[:k] == own)
+            if len(earlier):
+                path[k] = paths[earlier].sum()
+                peak[k] = peaks[earlier[np.abs(peaks[earlier]).argmax()]]
+        return {"path": path, "largest_angle": np.abs(peak), "side": np.sign(peak)}
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         """γ at each point and at the one before, γ̇, and force per moment."""

@@ -15,7 +15,8 @@ from typing import Any
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import product_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .terms import FORGETFUL, MEMORIES, STICKS, X, Y, of_a_law, ranges_of, reported, shapes
+from .shapes import FORGETFUL, X, Y, fitted, shapes
+from .terms import as_reported, of_a_law, ranges_of, remembering
 from .variant import FrameVariant
 
 __all__ = ["products"]
@@ -71,10 +72,7 @@ def products(ranges: Mapping[str, float]) -> list[Effect]:
     largest = ranges_of(ranges)
     found = []
     for kind in KINDS:
-        groups: dict[str, list[str]] = {}
-        for variable in kind.by:
-            groups.setdefault(reported(variable), []).append(variable)
-        for by, variables in groups.items():
+        for by, variables in as_reported(kind.by).items():
             name = f"{kind.base}_moment_of_{kind.also}_and_{by}"
             forms = [form for v in variables for form in _forms(kind, name, v, largest)]
             words = f"{kind.base} moment, by {kind.also} and {by} together"
@@ -99,12 +97,7 @@ def _forms(
         fixed: dict[str, Any] = {"base": kind.base, "variable": variable}
         fixed |= {"reach": largest[variable], "also": kind.also, "powers": powers}
         fixed["also_reach"] = largest[kind.also]
-        if variable in FORGETFUL:
-            full = largest["time"]
-            starts = tuple(share * full for share in MEMORIES)
-            fixed["memory"] = Parameter(f"{name}_memory_s", starts, starts[0] / 10.0, full)
-        if kind.base == "dissipative":
-            fixed["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-4, 0.3)
+        fixed |= remembering(name, kind.base, variable, largest)
         if kind.constants:
             # A dashpot that depends on nothing is in the baseline.
             own = [
@@ -142,10 +135,7 @@ def _form(label: str, own: dict[str, Any]) -> FrameVariant:
         also=X[own["also"]],
         also_reach=own["also_reach"],
     )
-    numbers = [*own["coefficients"], *own.get("constants", ()), *own.values()]
-    parameters = [n for n in numbers if isinstance(n, Parameter)]
-    ordered = tuple(sorted(parameters, key=lambda p: not p.amplitude))
-    return FrameVariant(label, ordered, shape=shape, laws=partial(of_a_law, own))
+    return FrameVariant(label, fitted(own), shape=shape, laws=partial(of_a_law, own))
 
 
 def _factor(numbers: Mapping[str, Any], values: Values, x: Any, w: Any) -> Any:

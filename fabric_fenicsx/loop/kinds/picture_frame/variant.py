@@ -20,6 +20,7 @@ class FrameVariant(Variant):
 
     Attributes:
         laws: laws of a crossing (mechanics.laws) whose moments per area of fabric [N] add.
+        by_run: factor of these, from the parameters and how many runs of its specimen were before.
         travel: true crosshead displacement [mm] from the parameters, the crosshead's place D [mm]
             and the true displacement at the reading before, None unless ``remembers_travel``.
         reading: what the load cell adds [N] at the time t [s].
@@ -27,7 +28,14 @@ class FrameVariant(Variant):
         added_reading: what the load cell adds [N], from the parameters and what ``of`` names.
         added_travel: by how much the frame is ahead of the crosshead [mm], from the same.
         of: of "time" in the run [s], the crosshead's "displacement" [mm], "speed" [mm/s] and
-            "acceleration" [mm/s²], the "force" [N] of the model and its "force_rate" [N/s].
+            "acceleration" [mm/s²], the "force" [N] of the model and its "force_rate" [N/s], and
+            "per_time", 1 over the step from the point before [1/s], and "run", how many there were
+            before in its folder.
+        remembered: what ``added_reading`` and ``added_travel`` find as "memory" among these, from
+            the parameters, the others, and its value at the point before; 0 before the first.
+        variable: what a term without a formula depends on, from these; by default the first.
+        carried: what ``laws`` remember as "variable" from earlier runs of a specimen, "path" or
+            "largest_angle"; empty where each run begins anew.
         of_baseline: parameters of the baseline that ``laws`` needs as well.
         each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
             has. Those of a holdout run can only come from that run: its error is then what is
@@ -35,12 +43,16 @@ class FrameVariant(Variant):
     """
 
     laws: Callable[[Values], tuple[Any, ...]] | None = None
+    by_run: Callable[[Values, Any], Any] | None = None
     travel: Callable[[Values, Any, Any], Any] | None = None
     reading: Callable[[Values, Any], Any] | None = None
     remembers_travel: bool = False
     added_reading: Callable[[Values, Values], Any] | None = None
     added_travel: Callable[[Values, Values], Any] | None = None
     of: tuple[str, ...] = ()
+    remembered: Callable[[Values, Values, Any], Any] | None = None
+    variable: Callable[[Values], Any] | None = None
+    carried: str = ""
     of_baseline: tuple[str, ...] = ()
     each_run: bool = False
 
@@ -64,7 +76,12 @@ def law_effects(
             (form.meaning for _, form in forms if form.meaning), ""
         )
         variants = [
-            FrameVariant(form.label, form.parameters, laws=partial(form.laws, law))
+            FrameVariant(
+                form.label,
+                form.parameters,
+                laws=partial(form.laws, law),
+                carried=form.carried,
+            )
             for law, form in sorted(forms, key=lambda pair: pair[1].rank)
         ]
         of_fabric = all(law.of_fabric for law, _ in forms)

@@ -1,0 +1,136 @@
+"""Shapes of terms without a formula: what they are over, and how many numbers each has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from ....inputs.parameters import Parameter
+from ....mechanics.laws.shaped import GRADED, shape_of
+from ...inference.effects import Values, valued
+
+__all__ = [
+    "FORGETFUL",
+    "Ends",
+    "X",
+    "Y",
+    "factor",
+    "fitted",
+    "memory_of",
+    "over_runs",
+    "shapes",
+    "wealth",
+]
+
+#: Numbers of coefficients of a spline; the last one of what a place may have to itself.
+SPLINES = (1, 2, 3, 5, 9)
+#: What has that one.
+FINE = (("odd", "angle"), ("even", "angle"), ("reading", "displacement"), ("reading", "force"))
+#: Where a step may begin to be looked for, as a share of the range, and how wide it is.
+PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
+#: Decays, as shares of the range.
+DECAYS = (0.1, 0.3)
+#: Where a logarithm bends over, as shares of it.
+BENDS = (0.01, 0.1)
+#: Memories, as shares of the longest run.
+MEMORIES = (0.01, 0.05, 0.2)
+
+FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate")
+"""Variables of a fading memory."""
+
+Ends = Mapping[str, tuple[float, float]]
+"""Between which shares of their largest sizes variables were, by their names."""
+
+X = {
+    "angle": "shear_angle_rad",
+    "largest_angle": "largest_angle_rad",
+    "relative_angle": "angle_over_largest",
+    "recent_angle": "recent_angle_rad",
+    "recent_largest_angle": "recent_largest_angle_rad",
+    "path": "path_rad",
+    "rate": "shear_rate_rad_s",
+    "recent_rate": "recent_rate_rad_s",
+    "unloading": "unloading",
+    "time": "time_s",
+    "displacement": "displacement_mm",
+    "speed": "speed_mm_s",
+    "acceleration": "acceleration_mm_s2",
+    "force": "force_N",
+    "force_rate": "force_rate_N_s",
+    "recent_force": "recent_force_N",
+    "largest_force": "largest_force_N",
+    "force_lag": "force_lag_N",
+    "displacement_lag": "displacement_lag_mm",
+    "run": "runs_before",
+}
+"""Variables with their units."""
+
+Y = {
+    "elastic": "share_of_elastic_moment",
+    "rest": "rest_angle_rad",
+    "viscous": "moment_per_rate_N_s",
+    "reading": "reading_N",
+    "travel": "travel_mm",
+}
+"""What a term is a factor of, or adds, with units."""
+
+
+def fitted(numbers: Mapping[str, Any]) -> tuple[Parameter, ...]:
+    """The parameters among a term's numbers, amplitudes first."""
+    every = [*numbers["coefficients"], *numbers.get("constants", ()), *numbers.values()]
+    parameters = [n for n in every if isinstance(n, Parameter)]
+    return tuple(sorted(parameters, key=lambda p: not p.amplitude))
+
+
+def factor(numbers: Mapping[str, Any], values: Values, x: Any) -> Any:
+    """A law's factor, or what is added, at a share x of the reach."""
+    own = {key: valued(n, values) for key, n in numbers.items()}
+    shape = own.pop("shape"), own.pop("coefficients")
+    at = {key: own[key] for key in ("place", "width", "ends") if key in own}
+    return own.get("constant", 0.0) + shape_of(*shape, x, **at)
+
+
+def memory_of(name: str, largest: Mapping[str, float], *shares: float) -> Parameter:
+    """The memory of a term's variable [s], looked for at shares of the longest run."""
+    full = largest["time"]
+    starts = tuple(share * full for share in shares or MEMORIES)
+    return Parameter(f"{name}_memory_s", starts, starts[0] / 10.0, full)
+
+
+def wealth(base: str, variable: str) -> int:
+    """How many of the splines, which are the more the less else there is to be found."""
+    if variable == "unloading":
+        return 1
+    if (base, variable) in FINE:
+        return 5
+    return 3 if variable in (*FORGETFUL, "recent_force") else 4
+
+
+def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
+    """Shapes over one variable: label, coefficients, other numbers of the shape.
+
+    Args:
+        name: of the term, with which its parameters begin.
+        wealth: how many of the splines; one alone is the line, four have every other shape too.
+    """
+    for count in SPLINES[:wealth]:
+        own = tuple(Parameter(f"{name}_{k + 1}", amplitude=True) for k in range(count))
+        yield f"{count} coefficients" if count > 1 else "linear", own, {"shape": "spline"}
+    if wealth > 1:
+        one = (Parameter(f"{name}_1", amplitude=True),)
+        place = Parameter(f"{name}_place", PLACES, 0.0, 1.0)
+        width = Parameter(f"{name}_width", WIDTHS, 0.01, 0.5)
+        yield "step", one, {"shape": "step", "place": place, "width": width}
+        decay = Parameter(f"{name}_decay", DECAYS, 0.01, 2.0)
+        yield "saturation", one, {"shape": "saturation", "width": decay}
+    if wealth >= 4:
+        own = tuple(Parameter(f"{name}_{k + 1}", amplitude=True) for k in range(len(GRADED) + 2))
+        yield "graded", own, {"shape": "graded"}
+        bend = Parameter(f"{name}_bend", BENDS, 1e-3, 1.0)
+        yield "logarithm", one, {"shape": "logarithm", "width": bend}
+
+
+def over_runs(name: str) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
+    """Shapes over the few runs that there are: as ``shapes``, but no more than two numbers."""
+    chosen = ("linear", "2 coefficients", "saturation")
+    return (shape for shape in shapes(name, 2) if shape[0] in chosen)

@@ -1,0 +1,145 @@
+"""A crosshead's rig along its records: what is known there, what load cell and frame add."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...mechanics.scalars import derivative_of
+from ..expressions.marching import Marched, Varying
+from .picture_frame.motion import Motion
+from .picture_frame.variant import FrameVariant
+from .records import laid_out
+
+__all__ = ["RecordedRig"]
+
+Array = npt.NDArray[np.float64]
+
+
+class RecordedRig:
+    """What a rig did, point by point of its records side by side; see records.laid_out.
+
+    Args:
+        motions: of the runs.
+        compiled: where expressions are kept.
+
+    Attributes:
+        points: by name, (n_points, n_runs) each.
+        place: point and run of every reading, (n,) each.
+        before: how many runs of its folder were before each, (n_runs,).
+    """
+
+    def __init__(self, motions: Sequence[Motion], compiled: dict[Any, Marched]) -> None:
+        self.points, self.place = laid_out(motions)
+        self._compiled = compiled
+        self.before = np.zeros(len(motions))
+
+    def at_readings(self, values: Array) -> Array:
+        """Of values at the points those at every reading, (n,)."""
+        return np.broadcast_to(values, self.points["D"].value.shape)[self.place]
+
+    def travel(self, variant: FrameVariant | None, values: Mapping[str, float]) -> Any:
+        """True displacement of the frame, and its rate."""
+        if variant is None or variant.travel is None:
+            return self.points
+        key = (variant, "travel")
+        if key not in self._compiled:
+            marched = Marched(("D", "D_rate"), tuple(p.name for p in variant.parameters))
+            past = marched.remembered("D") if variant.remembers_travel else None
+            true = variant.travel(marched.at, marched.at["D"], past)
+            rate = derivative_of(true, marched.at["D"]) * marched.at["D_rate"]
+            history = {"D": true} if variant.remembers_travel else {}
+            self._compiled[key] = marched.define({"D": true, "D_rate": rate}, history)
+        return self._compiled[key](self.points, values)
+
+    def added(
+        self, variant: FrameVariant, wanted: str, force: Varying, values: Mapping[str, float]
+    ) -> Varying:
+        """What a form adds to the "reading" [N] or to the "travel" [mm], or its "variable"."""
+        key = (variant, wanted)
+        if key not in self._compiled:
+            marched = Marched(variant.of, tuple(p.name for p in variant.parameters))
+            at, history = dict(marched.at), {}
+            if variant.remembered is not None:
+                past = marched.remembered("memory")
+                at["memory"] = history["memory"] = variant.remembered(marched.at, at, past)
+            if wanted == "variable":
+                assert variant.variable is not None
+                value = variant.variable(at)
+            else:
+                of = variant.added_reading if wanted == "reading" else variant.added_travel
+                assert of is not None
+                value = of(marched.at, at)
+            self._compiled[key] = marched.define({wanted: value}, history)
+        marched, known = self._compiled[key], self.known(force)
+        return marched({name: known[name]() for name in marched.inputs}, values)[wanted]
+
+    def known(self, force: Varying) -> dict[str, Callable[[], Varying]]:
+        """What is known at a reading, by the names of FrameVariant.of, where it is wanted."""
+        return {
+            "time": self._since_start,
+            "displacement": lambda: self.points["D"],
+            "speed": lambda: self.points["D_rate"],
+            "acceleration": lambda: self.per_second(self.points["D_rate"]),
+            "force": lambda: force,
+            "force_rate": lambda: self.per_second(force),
+            "per_time": lambda: self.points["per_time"],
+            "run": lambda: self.each(self.before),
+        }
+
+    def each(self, numbers: Array) -> Varying:
+        """A number of each run at its points."""
+        return Varying(np.broadcast_to(numbers, self.points["time"].value.shape))
+
+    def _since_start(self) -> Varying:
+        """Time in each run [s]."""
+        time = self.points["time"].value
+        return Varying(time - time[0])
+
+    def per_second(self, x: Varying) -> Varying:
+        """How fast something changes along each record: differences of second order within it."""
+        step, weights = self._differences
+
+        def rate(values: Array) -> Array:
+            values = np.broadcast_to(values, (len(step) + 1, step.shape[1]))
+            found = np.empty(values.shape)
+            places = values[:-2], values[1:-1], values[2:]
+            found[1:-1] = sum(w * v for w, v in zip(weights, places, strict=True))
+            found[0] = (values[1] - values[0]) / step[0]
+            found[-1] = (values[-1] - values[-2]) / step[-1]
+            return found
+
+        return Varying(rate(x.value), {p: rate(slope) for p, slope in x.slopes.items()})
+
+    @cached_property
+    def _differences(self) -> tuple[Array, tuple[Array, Array, Array]]:
+        """Steps of time, and weights of a value and its neighbours in how fast it changes."""
+        step = np.diff(self.points["time"].value, axis=0)
+        before, after = step[:-1], step[1:]
+        both = before + after
+        return step, (
+            -after / (before * both),
+            (after - before) / (before * after),
+            before / (after * both),
+        )
+
+    def moved(self, travel: Any, ahead: Varying) -> dict[str, Varying]:
+        """A travel with what is added to it, and its rate."""
+        return {
+            "D": travel["D"] + ahead,
+            "D_rate": travel["D_rate"] + self.per_second(ahead),
+        }
+
+    def reading(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
+        """What a form's load cell adds by the time [N]."""
+        key = (variant, "reading")
+        if key not in self._compiled:
+            assert variant.reading is not None
+            marched = Marched(("time",), tuple(p.name for p in variant.parameters))
+            added = variant.reading(marched.at, marched.at["time"])
+            self._compiled[key] = marched.define({"force": added}, {})
+        return self._compiled[key](self.points, values)["force"]

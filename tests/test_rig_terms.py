@@ -1,0 +1,344 @@
+"""Terms without a formula of what remembers: a rig, and a specimen from run to run."""
+
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.optimize import brentq
+from ufl import as_ufl
+
+from fabric_fenicsx.inputs.python_file import run_file
+from fabric_fenicsx.loop.diagnose import read_measurement
+from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.noise import Noise
+from fabric_fenicsx.loop.inference.variances import Variances
+from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
+from fabric_fenicsx.loop.kinds.picture_frame.rig_terms import of_the_rig
+from fabric_fenicsx.loop.own_effects import read_effects
+from fabric_fenicsx.loop.report.discovered import Discovered
+from fabric_fenicsx.loop.report.effect_file import effect_file
+
+FRAME, FABRIC, NOISE = 200.0, 100.0, 0.005
+BASE = {"k1_N": 0.3, "k3_N": 1.2, "c1_N_s": 5.0}
+#: Seconds, and travels [mm] that they lead to: out, hold, back, out further, hold, back, rest.
+PROGRAMME = ((40.0, 20.0), (60.0, 20.0), (20.0, 4.0), (50.0, 40.0), (80.0, 40.0), (40.0, 0.0))
+LAST = ((30.0, 30.0), (40.0, 30.0), (30.0, 3.0), (60.0, 36.0), (40.0, 0.0))
+
+
+def force_of(D, speed):
+    """What the baseline's frame needs [N]."""
+    theta = np.arccos((np.sqrt(2.0) + D / FRAME) / 2.0)
+    gamma = np.pi / 2 - 2 * theta
+    rate = speed / (FRAME * np.sin(theta))
+    m = BASE["k1_N"] * gamma + BASE["k3_N"] * gamma**3 + BASE["c1_N_s"] * rate
+    return m * FABRIC**2 / (FRAME * np.sin(theta))
+
+
+def mean_over(x, t, memory):
+    """τ ds/dt = x − s from nothing, x piecewise linear, exactly."""
+    s = np.zeros_like(x)
+    for k in range(1, len(x)):
+        h, slope = t[k] - t[k - 1], (x[k] - x[k - 1]) / (t[k] - t[k - 1])
+        kept = np.exp(-h / memory)
+        s[k] = x[k] - slope * memory + kept * (s[k - 1] - x[k - 1] + slope * memory)
+    return s
+
+
+def creeping_cell(t, D, speed):
+    """A tenth of the force more after 15 s."""
+    force = force_of(D, speed)
+    return force + 0.1 * mean_over(force, t, 15.0)
+
+
+def given_way(t, D, slip):
+    """Force [N] of a frame that is ``slip(force, before)`` [mm] behind, step by step."""
+    true, behind, found = np.zeros_like(D), 0.0, np.zeros_like(D)
+    for k in range(1, len(t)):
+        h = t[k] - t[k - 1]
+
+        def missed(place, k=k, h=h, behind=behind):
+            force = force_of(place, (place - true[k - 1]) / h)
+            return place - D[k] + slip(force, behind, h)
+
+        true[k] = brentq(missed, D[k] - 3.0, D[k] + 3.0, xtol=1e-12)
+        found[k] = force_of(true[k], (true[k] - true[k - 1]) / h)
+        behind = D[k] - true[k]
+    return found
+
+
+def creeping_grips(t, D, speed):
+    """They give way by 0.1 mm/N within 60 s."""
+
+    def slip(force, behind, h):
+        return behind + (1.0 - np.exp(-h / 60.0)) * (0.1 * force - behind)
+
+    return given_way(t, D, slip)
+
+
+def rubbing_guide(t, D, speed):
+    """Friction with 0.06 of the force; in a hold it stays."""
+    force, way = force_of(D, speed), np.sign(speed)
+    for k in range(1, len(way)):
+        way[k] = way[k] or way[k - 1]
+    return force + (0.1 + 0.06 * np.abs(force)) * way
+
+
+def slipping_grips(t, D, speed):
+    """By 0.0015 mm/N² times the largest force squared; what slipped does not come back."""
+    return given_way(t, D, lambda force, behind, h: max(behind, 0.0015 * force * abs(force)))
+
+
+RUNS = {"a": PROGRAMME, "b": PROGRAMME[::-1][1:], "c": LAST}
+
+
+def write(folder, measured, runs=RUNS):
+    folder.mkdir(parents=True)
+    rng = np.random.default_rng(3)
+    lines = []
+    for k, (name, legs) in enumerate(runs.items()):
+        at = np.cumsum([0.0, *(seconds for seconds, _ in legs)])
+        ends = np.array([0.0, *(place for _, place in legs)])
+        fine = np.linspace(0.0, at[-1], 10 * int(at[-1]) + 1)
+        D = np.interp(fine, at, ends)
+        leg = np.clip(np.searchsorted(at, fine) - 1, 0, len(legs) - 1)
+        speed = (np.diff(ends) / np.diff(at))[leg]
+        force = (measured(fine, D, speed, k) if runs is MORE else measured(fine, D, speed))[::10]
+        force = force + NOISE * rng.standard_normal(len(force))
+        table = np.column_stack([fine[::10], D[::10], force])
+        head = "time_s,displacement_mm,force_N"
+        np.savetxt(folder / f"{name}.csv", table, "%.9g", ",", header=head, comments="")
+        role = "holdout" if legs is LAST else "fit"
+        lines.append(f"- {{file: {name}.csv, role: {role}, specimen: S}}\n")
+    (folder / "measurement.yaml").write_text(
+        "schema: fabric-measurement/1\ntest: picture_frame\ntitle: a rig\n"
+        "fabric: {areal_density_kg_m2: 0.2, tow_spacing_mm: 5}\n"
+        f"rig: {{frame_length_mm: {FRAME}, fabric_length_mm: {FABRIC}}}\n"
+        f"noise: {{force_N: {NOISE}}}\nruns:\n" + "".join(lines)
+    )
+    return PictureFrame([read_measurement(folder)])
+
+
+MORE = {"a": PROGRAMME, "b": PROGRAMME[::-1][1:], "c": LAST, "d": PROGRAMME[1:], "e": PROGRAMME}
+
+
+def wearing_spring(t, D, speed, run):
+    """Each run takes 4 % of the spring as it was new."""
+    still = force_of(D, np.zeros_like(D))
+    return force_of(D, speed) - 0.04 * run * still
+
+
+def wandering_zero(t, D, speed, run):
+    """The crosshead's zero is 0.05 mm further with each run."""
+    return force_of(D - 0.05 * run, speed)
+
+
+@pytest.mark.parametrize(
+    ("measured", "term", "slope"),
+    [
+        (wearing_spring, "elastic_moment_of_run", -0.04),
+        (wandering_zero, "travel_of_run", -0.05),
+    ],
+)
+def test_what_changes_from_run_to_run(tmp_path, measured, term, slope):
+    """Leaves noise in the run held out between them, and is as large as it was put in."""
+    experiment = write(tmp_path / "set", measured, MORE)
+    (variant,) = (
+        v for t in experiment.terms if t.name == term for v in t.variants if v.label == "linear"
+    )
+    readings, white = experiment.readings, Variances(Noise(NOISE))
+    rows, holdout = readings.fit, readings.holdout & readings.usable
+    start = BASE | {p.name: 1e-3 for p in variant.parameters}
+    found = fit(experiment, (variant,), start, rows, white)
+    assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
+    assert found.rms(rows) < 1.1 * NOISE and found.rms(holdout) < 1.2 * NOISE
+    assert found.values[f"{term}_1"] / 4.0 == pytest.approx(slope, rel=0.05)
+
+
+def sum_of_earlier(run, of):
+    """What ``of(angle)`` of earlier runs add up to."""
+    total = 0.0
+    for legs in [*MORE.values()][:run]:
+        D = np.concatenate([[0.0], *(np.linspace(a, b, 200) for a, b in pairwise(ends_of(legs)))])
+        total += of(angle_at(D))
+    return total
+
+
+def ends_of(legs):
+    return [0.0, *(place for _, place in legs)]
+
+
+def angle_at(D):
+    return np.pi / 2 - 2 * np.arccos((np.sqrt(2.0) + D / FRAME) / 2.0)
+
+
+def abraded_spring(t, D, speed, run):
+    """Of the spring 30 % are lost with the path of all runs, within 0.8 rad."""
+    gamma = angle_at(D)
+    path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(gamma)))])
+    path = path + sum_of_earlier(run, lambda g: np.abs(np.diff(g)).sum())
+    still = force_of(D, np.zeros_like(D))
+    return force_of(D, speed) - 0.3 * (1.0 - np.exp(-path / 0.8)) * still
+
+
+def test_a_specimen_remembers_its_earlier_runs(tmp_path):
+    """The path of all its runs leaves noise, that of each does not, and the file says which."""
+    experiment = write(tmp_path / "set", abraded_spring, MORE)
+    effect = next(t for t in experiment.terms if t.name == "elastic_moment_of_path")
+    readings, white = experiment.readings, Variances(Noise(NOISE))
+    rows, holdout = readings.fit, readings.holdout & readings.usable
+
+    def left(label):
+        variant = next(v for v in effect.variants if v.label == label)
+        some = BASE | {p.name: -0.1 for p in variant.amplitudes}
+        starts = [some | shape for shape in variant.grid(amplitudes=False)]
+        fits = [fit(experiment, (variant,), start, rows, white) for start in starts]
+        return min(fits, key=lambda found: found.sum_of_squares)
+
+    found = left("path of all runs, saturation")
+    assert found.rms(rows) < 1.1 * NOISE and found.rms(holdout) < 1.2 * NOISE
+    assert left("path, saturation").rms(rows) > 3.0 * NOISE
+    (variant,) = found.variants
+    width = variant.shape.reach * found.values["elastic_moment_of_path_decay"]
+    assert width == pytest.approx(0.8, rel=0.05)
+    term = Discovered("discovered_1", effect, variant, found.values, pd.DataFrame(), "formula")
+    (tmp_path / "discovered_1.py").write_text(effect_file(term, "made up"))
+    again = PictureFrame(
+        [read_measurement(tmp_path / "set")], read_effects(tmp_path / "discovered_1.py")
+    )
+    (own,) = (e for e in again.effects if e.name == "discovered_1")
+    values = found.values | {"discovered_1_amount": 1.0}
+    same, _ = again.predict(own.variants, values)
+    assert same == pytest.approx(found.expected, abs=1e-9)
+
+
+def test_two_runs_have_no_term_by_the_run(tmp_path):
+    """What two runs differ by is a line whatever it is."""
+    few = {"a": PROGRAMME, "b": PROGRAMME[::-1][1:]}
+    names = {t.name for t in write(tmp_path / "few", creeping_cell, few).terms}
+    assert not any("_of_run" in name for name in names)
+
+
+def stepped(variant, values, **columns):
+    """What a form adds at each step of one second."""
+    expression = variant.added_reading or variant.added_travel
+    past, found = as_ufl(0.0), []
+    for row in zip(*columns.values(), strict=True):
+        at = {name: as_ufl(float(x)) for name, x in zip(columns, row, strict=True)}
+        at["per_time"] = as_ufl(1.0)
+        if variant.remembered is not None:
+            past = at["memory"] = as_ufl(float(variant.remembered(values, at, past)))
+        found.append(float(expression(values, at)))
+    return found
+
+
+def test_variables_that_remember():
+    """A mean goes as 1 − e^(−t/τ), a lag as −e^(−t/τ), a largest force stays."""
+    held = np.full(6, 2.0)
+    kept = np.exp(-np.arange(1, 7) / 3.0)
+    itself = {"added": lambda p, x: x, "parameters": ()}
+
+    def of(variable):
+        return of_the_rig("it", acts_on="reading", variable=variable, memory=3.0, **itself)
+
+    assert stepped(of("recent_force"), {}, force=held) == pytest.approx(2.0 * (1.0 - kept))
+    assert stepped(of("force_lag"), {}, force=held) == pytest.approx(-2.0 * kept)
+    assert stepped(of("displacement_lag"), {}, displacement=held) == pytest.approx(-2.0 * kept)
+    to_and_fro = np.array([1.0, -3.0, 2.0, 0.0, 4.0])
+    largest = [1.0, 3.0, 3.0, 3.0, 4.0]
+    assert stepped(of("largest_force"), {}, force=to_and_fro) == pytest.approx(largest)
+
+
+def test_a_guide_that_sticks_keeps_its_sign():
+    speed, place = np.array([1.0, 1.0, 0.0, -2.0, 0.0, 0.0, 1.0]), np.full(7, 5.0)
+
+    def of(turning):
+        options = {"turning": turning, "slow": 1e-3}
+        return of_the_rig("it", (), "reading", "displacement", lambda p, x: x, **options)
+
+    columns = {"displacement": place, "speed": speed}
+    moving, kept = [1, 1, 0, -1, 0, 0, 1], [1, 1, 1, -1, -1, -1, 1]
+    assert stepped(of("at its rate"), {}, **columns) == pytest.approx(5.0 * np.array(moving))
+    assert stepped(of("kept in a hold"), {}, **columns) == pytest.approx(5.0 * np.array(kept))
+
+
+@pytest.mark.parametrize(
+    ("measured", "term", "label"),
+    [
+        (creeping_cell, "reading_of_force_lag", "linear"),
+        (creeping_grips, "travel_of_recent_force", "linear"),
+        (slipping_grips, "travel_of_largest_force", "5 coefficients"),
+        (rubbing_guide, "reading_of_force_and_direction", "each side its own, kept in a hold"),
+    ],
+)
+def test_what_remembers_leaves_noise(tmp_path, measured, term, label):
+    """In the run held out too; without it, and with the same variable now, much is left."""
+    experiment = write(tmp_path / "set", measured)
+    by_name = {t.name: t for t in experiment.terms}
+    readings = experiment.readings
+    rows, holdout = readings.fit, readings.holdout & readings.usable
+    white = Variances(Noise(NOISE))
+
+    def left(variant):
+        little = {p.name: 1e-3 for p in variant.parameters}
+        starts = [BASE | little | shape for shape in variant.grid(amplitudes=False)]
+        fits = [fit(experiment, (variant,), start, rows, white) for start in starts]
+        return min(fits, key=lambda found: found.sum_of_squares)
+
+    variant = next(v for v in by_name[term].variants if v.label == label)
+    found = left(variant)
+    assert found.rms(rows) < 1.3 * NOISE and found.rms(holdout) < 1.3 * NOISE
+    assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
+    acts_on = term.partition("_")[0]
+    for other in (f"{acts_on}_of_force", f"{acts_on}_of_displacement", f"{acts_on}_of_time"):
+        now = next(v for v in by_name[other].variants if v.label == "5 coefficients")
+        assert left(now).rms(rows) > 1.5 * NOISE, other
+
+
+@pytest.mark.parametrize("name", ["reading_of_force_lag", "travel_of_recent_force"])
+def test_derivatives_of_what_remembers(tmp_path, name):
+    """In the coefficient, the memory and the baseline, against central differences."""
+    experiment = write(tmp_path / "set", creeping_cell)
+    variant = next(t for t in experiment.terms if t.name == name).variants[0]
+    first, memory = (p.name for p in variant.parameters)
+    values = {**BASE, first: 0.2, memory: 12.0}
+    _, slopes = experiment.predict((variant,), values)
+    for p, x in values.items():
+        h = 1e-5 * x
+        ends = [experiment.predict((variant,), {**values, p: x + s * h})[0] for s in (1.0, -1.0)]
+        change = (ends[0] - ends[1]) / (2.0 * h)
+        assert np.abs(slopes[p] - change).max() < 1e-5 * np.abs(change).max(), p
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("reading_of_force_lag", "linear"),
+        ("reading_of_force", "each side its own"),
+        ("reading_of_time", "saturation"),
+        ("travel_of_recent_force", "2 coefficients"),
+        ("travel_of_largest_force", "step"),
+        ("travel_of_displacement_lag", "linear"),
+        ("reading_of_force_and_direction", "2 coefficients"),
+        ("reading_of_displacement_and_direction", "linear, kept in a hold"),
+        ("travel_of_run", "linear"),
+        ("elastic_moment_of_run", "saturation"),
+        ("viscous_moment_of_run", "2 coefficients"),
+    ],
+)
+def test_the_file_is_the_term(tmp_path, name, label):
+    """As an effect with one amount it adds the same, and is taken from the file."""
+    experiment = write(tmp_path / "set", wearing_spring, MORE)
+    effect = next(t for t in experiment.terms if t.name == name)
+    variant = next(v for v in effect.variants if v.label == label)
+    sizes = iter((0.3, -0.2, 0.4))
+    values = {p.name: p.starts[0] if p.starts else next(sizes) for p in variant.parameters}
+    found = Discovered("discovered_1", effect, variant, BASE | values, pd.DataFrame(), "formula")
+    (tmp_path / "discovered_1.py").write_text(effect_file(found, "made up"))
+    (own,) = run_file(tmp_path / "discovered_1.py", "effects").EFFECTS
+    (form,) = own.variants
+    expected, _ = experiment.predict((variant,), BASE | values)
+    without, _ = experiment.predict((), BASE)
+    assert np.abs(expected - without).max() > 2.0 * NOISE
+    same, _ = experiment.predict((form,), BASE | {"discovered_1_amount": 1.0})
+    assert same == pytest.approx(expected, abs=1e-12)
