@@ -11,10 +11,10 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 
-__all__ = ["cell_array", "poly_data"]
+__all__ = ["poly_data"]
 
 
-def cell_array(sizes: npt.NDArray[np.int64], corners: npt.NDArray[np.int64]) -> vtkCellArray:
+def _cells(sizes: npt.NDArray[np.int64], corners: npt.NDArray[np.int64]) -> vtkCellArray:
     """Cells of ``sizes`` points each, (m,), whose points stand one after the other."""
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     numbers = np.ascontiguousarray(corners, dtype=np.int64).ravel()
@@ -45,9 +45,9 @@ def poly_data(
     data.SetPoints(places)
     if faces is not None:
         count, corners = faces.shape
-        data.SetPolys(cell_array(np.full(count, corners), faces))
+        data.SetPolys(_cells(np.full(count, corners), faces))
     if lines is not None:
-        data.SetLines(cell_array(np.array(lines), np.arange(len(points))))
+        data.SetLines(_cells(np.array(lines), np.arange(len(points))))
     for name, array in (values or {}).items():
         at_points = numpy_to_vtk(np.ascontiguousarray(array), deep=True)
         at_points.SetName(name)
