@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from .processor import choose_kernels
+from .startup import collect_seldom, end_soon, stand_in_for_pkg_resources
 
 __all__ = ["main"]
 
@@ -20,13 +21,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     # Parallelism is MPI's; threads of BLAS on top of it only get in each other's way.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     given = sys.argv[1:] if arguments is None else arguments
-    if given and given[0] in SOLVING:
+    solving = bool(given) and given[0] in SOLVING
+    if solving:
         choose_kernels()
+        stand_in_for_pkg_resources()
+    # Given arguments the process is another's, and goes on.
+    if solving and arguments is None:
+        collect_seldom()
     if not os.environ.get("DISPLAY"):
         # VTK tries an X server first and complains when there is none.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        # pyvista would open a window to learn whether it can.
-        os.environ.setdefault("ALLOW_PLOTTING", "true")
 
     from .cli import app
     from .cli.collective import say
@@ -65,6 +69,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             MPI.COMM_WORLD.barrier()
         code = InputError.exit_code
     sys.stdout.flush()
+    if solving and arguments is None:
+        end_soon()
     sys.exit(code)
 
 

@@ -76,11 +76,8 @@ class Following:
 
 
 @contextmanager
-def following(quiet: bool) -> Iterator[Any]:
-    """A function (fraction, steps, iterations) that shows progress, or does not when quiet."""
-    if quiet:
-        yield lambda fraction, steps, iterations: None
-        return
+def following() -> Iterator[Any]:
+    """A function (fraction, steps, iterations) that shows progress."""
     console = Console(stderr=True)
     bar = None
     if console.is_terminal:

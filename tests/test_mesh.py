@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from fabric_fenicsx.errors import InputError
-from fabric_fenicsx.fabric.gmsh_io import read_msh, write_msh
+from fabric_fenicsx.fabric.gmsh_io import mesh_net, read_msh, write_msh
 from fabric_fenicsx.fabric.net import WARP, WEFT
+from fabric_fenicsx.fabric.paths import is_straight
 from fabric_fenicsx.fabric.sheet import Sheet, centred_sheet, spaced_sheet
 
 gmsh = pytest.importorskip("gmsh")
@@ -408,7 +409,7 @@ def test_gmsh_prints_nothing_and_leaves_ctrl_c_alone(tmp_path):
     script = f"""
 import signal
 handler = signal.getsignal(signal.SIGINT)
-from fabric_fenicsx.fabric.gmsh_io import read_msh, write_msh
+from fabric_fenicsx.fabric.gmsh_io import mesh_net, read_msh, write_msh
 from fabric_fenicsx.fabric.sheet import centred_sheet
 write_msh(centred_sheet(24.0, 24.0, 12.0, 12.0), {str(tmp_path / "small.msh")!r})
 assert len(read_msh({str(tmp_path / "small.msh")!r}).crossings) == 4
@@ -469,3 +470,31 @@ def test_the_script_writes_the_demo_meshes(tmp_path):
     assert names == sorted(path.name for path in MESHES.glob("*.msh"))
     for name in names:
         assert_same_net(read_msh(tmp_path / name), read_msh(MESHES / name))
+
+
+def test_net_without_gmsh_is_the_one_that_gmsh_reads(tmp_path):
+    """Straight tows are divided as gmsh would; stations beside crossings keep their places."""
+    for sheet in (SMALL, centred_sheet(72.0, 50.0, 12.0, 8.0, subdivisions=3, quarter=True)):
+        assert is_straight(sheet)
+        write_msh(sheet, tmp_path / "sheet.msh")
+        read, made = read_msh(tmp_path / "sheet.msh"), mesh_net(sheet)
+        for field in fields(made):
+            of_file, own = getattr(read, field.name), getattr(made, field.name)
+            np.testing.assert_allclose(own, of_file, rtol=0.0, atol=GMSH_ROUNDING)
+
+
+def test_straight_net_needs_no_gmsh(tmp_path):
+    script = f"""
+import sys
+sys.modules["gmsh"] = None
+from fabric_fenicsx.fabric.gmsh_io import mesh_net, write_msh
+from fabric_fenicsx.fabric.sheet import centred_sheet
+sheet = centred_sheet(24.0, 24.0, 12.0, 12.0)
+print(len(mesh_net(sheet).crossings))
+try:
+    write_msh(sheet, {str(tmp_path / "sheet.msh")!r})
+except Exception as error:
+    print(type(error).__name__)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout.split() == ["4", "InputError"], done.stderr

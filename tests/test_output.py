@@ -7,18 +7,23 @@ import resource
 from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 import pyvista as pv
+from matplotlib import colormaps
+from matplotlib.colors import to_rgb
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import WARP, WEFT, Net, single_tow
 from fabric_fenicsx.output import files
-from fabric_fenicsx.output.lines import COLOURS
+from fabric_fenicsx.output.colours import colour_table, rgb
+from fabric_fenicsx.output.lines import COLOURS, arc_length
 from fabric_fenicsx.output.paraview import TimeSeries
-from fabric_fenicsx.output.pictures import VIEWS, aim, draw_net
-from fabric_fenicsx.output.surfaces import RevolvedSurface
+from fabric_fenicsx.output.pictures import VIEWS, _stations, aim, draw_net
+from fabric_fenicsx.output.surfaces import RevolvedSurface, triangles
+from fabric_fenicsx.output.vtk_xml import packed, xml_file
 from fabric_fenicsx.solving.snapshot import Snapshot, at_rest
 
 ARRAYS = [field.name for field in fields(Snapshot) if field.name != "time"]
@@ -354,20 +359,15 @@ def test_camera_shows_every_point_and_leaves_no_room(view: str, flat: bool) -> N
     """Against all points, of which the camera's search takes a few; also of a plane."""
     extent = [100.0, 70.0, 0.0 if flat else 30.0]
     points = np.random.default_rng(3).normal(size=(4000, 3)) * extent
-    plotter = SimpleNamespace(
-        camera=SimpleNamespace(enable_parallel_projection=lambda: None),
-        renderer=SimpleNamespace(ResetCameraClippingRange=lambda: None),
-    )
-    aim(plotter, view, [points], (1600, 1200))
-    camera = plotter.camera
-    w = np.subtract(camera.position, camera.focal_point)
+    looks: list[Any] = []
+    aim(SimpleNamespace(look=lambda *look: looks.append(look)), view, [points], (1600, 1200))
+    ((focus, position, up, angle, height),) = looks
+    w = np.subtract(position, focus)
     away = np.linalg.norm(w)
-    u, v, w = np.cross(camera.up, w / away), np.array(camera.up), w / away
-    a, b, depth = ((points - camera.focal_point) @ axis for axis in (u, v, w))
-    if view == "perspective":
-        s = np.tan(np.radians(camera.view_angle) / 2.0) * (away - depth)
-    else:
-        s = camera.parallel_scale
+    u, v, w = np.cross(up, w / away), np.array(up), w / away
+    a, b, depth = ((points - focus) @ axis for axis in (u, v, w))
+    s = height if height is not None else np.tan(np.radians(angle) / 2.0) * (away - depth)
+    assert (height is None) == (view == "perspective")
     p, q = a / s * 1200 / 1600, b / s
     assert p.min() > -0.9401 and p.max() < 0.6601 and q.min() > -0.9301 and q.max() < 0.8401
     # In one direction it is full, in the other the room is shared.
@@ -375,3 +375,63 @@ def test_camera_shows_every_point_and_leaves_no_room(view: str, flat: bool) -> N
     assert max(full) == pytest.approx(1.0, abs=1e-6)
     middle = [(p.min() + p.max()) / 2.0, (q.min() + q.max()) / 2.0]
     assert middle == pytest.approx([-0.14, -0.045], abs=1e-6)
+
+
+def test_scale_is_that_of_matplotlib():
+    part = np.linspace(0.06, 1.0, 256)
+    assert np.abs(colour_table() - colormaps["viridis"](part)[:, :3]).max() < 3.0 / 255.0
+    assert rgb("#336699") == pytest.approx(to_rgb("#336699"))
+    assert rgb("teal") == to_rgb("teal")
+
+
+def test_turned_profile_is_closed_at_seam_and_pole():
+    """A hemisphere has a rim and no other boundary; a repeated point leaves no empty triangle."""
+    angle = np.linspace(0.0, np.pi / 2.0, 91)
+    profile = 40.0 * np.column_stack([np.sin(angle), -np.cos(angle)])
+    profile = np.insert(profile, 30, profile[30], axis=0)
+    points, cells = triangles(RevolvedSurface("punch", profile, np.array([1.0, 2.0, 3.0])))
+    sides = np.sort(cells[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, times = np.unique(sides, axis=0, return_counts=True)
+    assert set(times) == {1, 2} and (times == 1).sum() == 180
+    a, b, c = points[cells].transpose(1, 0, 2)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
+    assert areas.min() > 0.0
+    assert areas.sum() == pytest.approx(2.0 * np.pi * 40.0**2, rel=3e-4)
+
+
+def test_tubes_have_pieces_where_their_curve_bends():
+    """Chords of an arc of radius R stay within s of it where their length is at most √(8 R s)."""
+    straight = np.linspace([0.0, 0.0, 0.0], [60.0, 0.0, 0.0], 11)
+    np.testing.assert_allclose(
+        _stations(straight, arc_length(straight), 0.02), arc_length(straight)
+    )
+    radius, near = 20.0, 0.05
+    angle = np.linspace(0.0, 1.5, 7)
+    bent = radius * np.column_stack([np.sin(angle), 1.0 - np.cos(angle), 0.0 * angle])
+    fine = _stations(bent, arc_length(bent), near)
+    longest = np.sqrt(8.0 * radius * near)
+    assert 0.5 * longest < np.diff(fine).max() < 1.1 * longest
+    assert np.isin(arc_length(bent), fine).all()
+
+
+@pytest.mark.parametrize("count", [0, 3, 200_000])
+def test_files_without_vtk_are_those_that_vtk_reads(tmp_path: Path, count: int):
+    """Also without a number in it, and with more than VTK puts into one block."""
+    points = np.random.default_rng(count).normal(size=(count, 3))
+    corners = np.arange(3 * (count // 3))
+    name = 'a <&" b'
+    sections = {
+        "PointData": {name: packed(points, ("u", "v", "w"))},
+        "Points": {"Points": packed(points, small=True)},
+        "Polys": {
+            "connectivity": packed(corners, small=True),
+            "offsets": packed(3 * np.arange(1, count // 3 + 1)),
+        },
+    }
+    counts = {"NumberOfPoints": count, "NumberOfPolys": count // 3}
+    parts = xml_file("PolyData", counts, sections, {"when": packed(np.array([1.5]))})
+    (tmp_path / "a.vtp").write_bytes(b"".join(parts))
+    mesh = pv.read(tmp_path / "a.vtp")
+    assert np.array_equal(mesh.points, points) and np.array_equal(mesh.point_data[name], points)
+    assert np.array_equal(mesh.faces.reshape(-1, 4)[:, 1:].ravel(), corners)
+    assert mesh.field_data["when"] == [1.5]

@@ -38,6 +38,8 @@ def _by_measure(form: ufl.Form) -> list[ufl.Form]:
     integrals of one measure are summed here because UFL would expand each for itself first and then
     compare what they share node by node, which took most of the time of a compilation.
     """
+    if len(form.integrals()) == 1:
+        return [form]
     groups: dict[str, list[Any]] = {}
     for integral in form.integrals():
         measure = (
@@ -84,8 +86,14 @@ def compile_form(form: ufl.Form, comm: MPI.Comm, *, here: bool = True, wide: boo
     """
     options = "jit_options" if "jit_options" in _FORM_OPTIONS else "jit_params"
 
+    # A kernel is looked up by the form's signature, which takes most of the time where it has been
+    # compiled before. A form keeps its own: all ranks find it here, before they take turns.
+    measures = _by_measure(form) if here else []
+    for part in measures:
+        part.signature()
+
     def compiled() -> list[Any]:
-        return [fem.form(part, **{options: dict(_JIT_OPTIONS)}) for part in _by_measure(form)]
+        return [fem.form(part, **{options: dict(_JIT_OPTIONS)}) for part in measures]
 
     def widened() -> list[_Part]:
         if not wide:

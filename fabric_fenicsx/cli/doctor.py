@@ -23,9 +23,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from fabric_fenicsx.output.canvas import canvas
 with TemporaryDirectory() as folder:
-    with canvas(Path(folder) / "a.png", (64, 48), ()) as plotter:
+    with canvas(Path(folder) / "a.png", (64, 48), ()) as scene:
         import pyvista
-        plotter.add_mesh(pyvista.Sphere(), color="black")
+        scene.add(pyvista.Sphere(), "#000000")
 """
 """Drawing may end the process that tries it."""
 

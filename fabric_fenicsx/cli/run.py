@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
 
 import typer
 
-from ..errors import SolveError
+from ..errors import InputError, SolveError
 from ..parallel import from_root
 from .collective import collective, say
 from .options import Settings
@@ -85,16 +85,16 @@ def _run(
 
     root = comm.rank == 0
     if root:
-        # Before PETSc and VTK. Whether a case that needs it can do without is said by its mesh.
-        with suppress(ImportError, OSError):
-            load_gmsh()
+        # Before PETSc and VTK. What is wrong with a case, or without gmsh, is said by its mesh.
+        with suppress(ImportError, OSError, ValueError, InputError):
+            if _by_gmsh(case, path.parent):
+                load_gmsh()
 
     from ..rigs.run import run
-    from ..terminal import following, summarise
 
     if options["uncertainty"] and not quiet:
         say(from_root(comm, lambda: _cost(case, path.parent)))
-    with following(quiet=quiet or not root) as progress:
+    with _following(quiet or not root) as progress:
         result = run(
             case,
             folder,
@@ -105,6 +105,8 @@ def _run(
         )
     if root:
         if not quiet:
+            from ..terminal import summarise
+
             summarise(result, folder)
         for sentence in result.get("health", {}).get("warnings", []):
             say(f"warning: {sentence}")
@@ -114,6 +116,24 @@ def _run(
         for sentence in result.get("uncertainty", {}).get("left_out", []):
             say(f"warning: not in the uncertainty: {sentence}")
     return 0 if result["completed"] else SolveError.exit_code
+
+
+def _by_gmsh(case: Any, base: Path) -> bool:
+    """Whether gmsh reads or makes the net of a case."""
+    from ..fabric.paths import is_straight
+    from ..rigs.registry import rig
+
+    fabrics = {} if case.mesh is not None else rig(case.test).fabrics(case, base)
+    return case.mesh is not None or not all(is_straight(fabric) for fabric in fabrics.values())
+
+
+def _following(quiet: bool) -> AbstractContextManager[Any]:
+    """What progress is told to; a terminal is not even looked for when quiet."""
+    if quiet:
+        return nullcontext(lambda fraction, steps, iterations: None)
+    from ..terminal import following
+
+    return following()
 
 
 def _cost(case: Any, base: Path) -> str:

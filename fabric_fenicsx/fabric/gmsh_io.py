@@ -22,7 +22,7 @@ import numpy.typing as npt
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.chains import net_from_lines, place
 from fabric_fenicsx.fabric.net import WARP, WEFT, Net
-from fabric_fenicsx.fabric.paths import TowPaths
+from fabric_fenicsx.fabric.paths import TowPaths, is_straight, straight_lines
 
 __all__ = ["GROUPS", "load_gmsh", "mesh_net", "read_msh", "write_msh"]
 
@@ -155,7 +155,7 @@ def read_msh(path: str | Path, *, crossing_gap: float = 0.0) -> Net:
 
 
 def mesh_net(fabric: TowPaths, *, crossing_gap: float = 0.0) -> Net:
-    """The net of a fabric, meshed by gmsh.
+    """The net of a fabric, as its tow mesh has it; by gmsh where tows are bent.
 
     Args:
         fabric: its tows.
@@ -164,13 +164,15 @@ def mesh_net(fabric: TowPaths, *, crossing_gap: float = 0.0) -> Net:
     Raises:
         InputError: there is no such net.
     """
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "tows.msh"
-        try:
+    try:
+        if is_straight(fabric):
+            return net_from_lines(*straight_lines(fabric), crossing_gap)[0]
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / "tows.msh"
             write_msh(fabric, path)
-        except ValueError as error:
-            raise InputError(str(error)) from None
-        return read_msh(path, crossing_gap=crossing_gap)
+            return read_msh(path, crossing_gap=crossing_gap)
+    except ValueError as error:
+        raise InputError(str(error)) from None
 
 
 def _check_header(path: Path) -> None:

@@ -9,7 +9,18 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["MOST_CELLS", "ROUNDING", "TowPath", "TowPaths", "check_size", "divide"]
+from .net import WARP, WEFT
+
+__all__ = [
+    "MOST_CELLS",
+    "ROUNDING",
+    "TowPath",
+    "TowPaths",
+    "check_size",
+    "divide",
+    "is_straight",
+    "straight_lines",
+]
 
 ROUNDING = 1e-9
 """Part of a length below which two lengths are the same."""
@@ -18,6 +29,7 @@ MOST_CELLS = 4_000_000
 """Of a net: beyond it a length is rather in the wrong unit than meant."""
 
 Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +71,48 @@ class TowPaths(Protocol):
     def tows(self, family: int) -> Sequence[TowPath]:
         """Paths of the tows of WARP or WEFT."""
         ...
+
+
+def is_straight(fabric: TowPaths) -> bool:
+    """Whether all tows are straight from station to station.
+
+    Raises:
+        ValueError: there is no such fabric.
+    """
+    return all(
+        control is None
+        for family in (WARP, WEFT)
+        for tow in fabric.tows(family)
+        for control in tow.controls
+    )
+
+
+def straight_lines(fabric: TowPaths) -> tuple[Floats, Integers, Integers]:
+    """Nodes and cells of straight tows, where gmsh puts them: pieces divided evenly.
+
+    Returns:
+        Node positions [mm], (n, 3), and the nodes of each cell of the warp and of the weft, (m, 2).
+
+    Raises:
+        ValueError: there is no such fabric.
+    """
+    points: list[Floats] = []
+    lines: list[Integers] = []
+    count = 0
+    for family in (WARP, WEFT):
+        own = [np.zeros((0, 2), dtype=np.int64)]
+        for tow in fabric.tows(family):
+            cells = np.asarray(tow.cells, dtype=np.int64)
+            piece = np.repeat(np.arange(len(cells)), cells)
+            part = np.arange(len(piece)) - np.repeat(np.cumsum(cells) - cells, cells)
+            share = (part / cells[piece])[:, None]
+            begin, end = tow.stations[piece], tow.stations[piece + 1]
+            points += [begin + share * (end - begin), tow.stations[-1:]]
+            nodes = count + np.arange(len(piece) + 1)
+            own.append(np.column_stack([nodes[:-1], nodes[1:]]))
+            count += len(nodes)
+        lines.append(np.concatenate(own))
+    return np.concatenate(points), lines[0], lines[1]
 
 
 def divide(

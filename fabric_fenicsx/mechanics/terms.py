@@ -15,7 +15,7 @@ from ufl import derivative
 
 from .fields import ConnectorFields, TowFields
 
-__all__ = ["Term", "energy_term", "side_by_side", "symmetric_part", "work_term"]
+__all__ = ["Term", "energy_term", "side_by_side", "symmetric_part", "total", "work_term"]
 
 Where = Literal["tows", "crossovers"]
 
@@ -90,7 +90,12 @@ def side_by_side(integrals: Sequence[Any], space: Any) -> Any:
         ufl.Form([part.reconstruct(part.integrand() * component) for part in whole.integrals()])
         for whole, component in zip(integrals, components, strict=True)
     ]
-    return sum(shares[1:], start=shares[0])
+    return total(shares)
+
+
+def total(forms: Sequence[Any]) -> Any:
+    """The sum of forms. UFL's own goes through all that it has added so far with each addition."""
+    return ufl.Form([integral for form in forms for integral in form.integrals()])
 
 
 def _where(fields: TowFields | ConnectorFields) -> Where:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -12,9 +12,8 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 import numpy as np
 import numpy.typing as npt
-from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
-__all__ = ["append_text", "replacing", "write_npz", "write_text", "write_vtk"]
+__all__ = ["append_text", "replacing", "write_bytes", "write_npz", "write_text", "write_vtk"]
 
 
 @contextmanager
@@ -43,6 +42,15 @@ def write_text(path: Path, text: str) -> None:
         OSError: it cannot be written; what was there before stays.
     """
     _write(path, lambda file: file.write(text.encode("utf-8")))
+
+
+def write_bytes(path: Path, parts: Iterable[bytes]) -> None:
+    """Write bytes one after the other.
+
+    Raises:
+        OSError: they cannot be written; what was there before stays.
+    """
+    _write(path, lambda file: file.writelines(parts))
 
 
 def append_text(path: Path, text: str) -> None:
@@ -104,6 +112,8 @@ def write_vtk(path: Path, data: Any, *, portable: bool = False) -> None:
     Raises:
         OSError: it cannot be written; what was there before stays.
     """
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
+
     polygons = data.IsA("vtkPolyData")
     writer: Any = vtkXMLPolyDataWriter() if polygons else vtkXMLUnstructuredGridWriter()
     writer.SetInputData(data)

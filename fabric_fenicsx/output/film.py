@@ -8,16 +8,16 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import replacing
 from fabric_fenicsx.output.lines import COLOURS, scale_limits, tow_lines
 from fabric_fenicsx.output.pictures import colour_map, draw_net
-from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
+from fabric_fenicsx.output.surfaces import TriangleSurface, triangles
 from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["encoder", "write_film"]
@@ -86,7 +86,7 @@ def write_film(
             for net, snapshot, tools in frames
             for cloud in (
                 net.points + snapshot.displacement,
-                *(np.asarray(triangulated(tool).points, dtype=float) for tool in tools),
+                *(triangles(tool)[0] for tool in tools),
             )
         ]
     )
@@ -115,14 +115,14 @@ def write_film(
                 _mp4(program, partial, Path(folder), len(pictures), rate)
 
 
-def _gif(path: Path, pictures: list[Path], rate: float, colours: Any) -> None:
+def _gif(path: Path, pictures: list[Path], rate: float, colours: npt.NDArray[np.float64]) -> None:
     from PIL import Image
 
     images = [Image.open(picture).convert("RGB") for picture in pictures]
     # One palette for all, or the colours flicker. The last picture has the most of them, and the
     # whole scale beside it, or the few pixels of the scale would get too few to look continuous.
     width, height = images[-1].size
-    scale = Image.fromarray(np.uint8(255 * colours(np.linspace(0.0, 1.0, SHADES))[None, :, :3]))
+    scale = Image.fromarray(np.uint8(255 * colours[None, :: len(colours) // SHADES]))
     both = Image.new("RGB", (width, 2 * height))
     both.paste(images[-1])
     both.paste(scale.resize((width, height), Image.Resampling.NEAREST), (0, height))

@@ -10,7 +10,7 @@ import pandas as pd
 import pyvista as pv
 
 from ..geometry.kinematic_net import KinematicNet
-from .canvas import canvas, headline
+from .canvas import canvas
 from .files import write_text
 from .lines import COLOURS, round_step, scale_limits
 from .pictures import LIGHTS, aim, colour_map, scale_bar
@@ -57,21 +57,14 @@ def draw_kinematic(
     mesh["values"] = np.abs(mesh["shear_deg"])
     limits = scale_limits(quantity, np.asarray(mesh["values"]))
     tows = _tows(net)
-    with canvas(path, size, LIGHTS) as plotter:
-        # The last mesh is the one whose values the scale shows.
-        plotter.add_mesh(tows, color="#3a3f45", line_width=size[1] / 1000.0)
-        plotter.add_mesh(
-            mesh,
-            scalars="values",
-            cmap=colour_map(quantity, limits),
-            clim=limits,
-            smooth_shading=True,
-            ambient=0.2,
-            show_scalar_bar=False,
-        )
-        scale_bar(plotter, quantity.title, limits, round_step(limits[1] - limits[0]), size)
-        headline(plotter, title, 18.0 * min(size[0] / 4.0, size[1] / 3.0) / 400.0)
-        aim(plotter, "perspective", [np.asarray(mesh.points)], size)
+    with canvas(path, size, LIGHTS) as scene:
+        scene.add(tows, "#3a3f45", line_width=size[1] / 2000.0)
+        smooth = mesh.compute_normals(cell_normals=False)
+        table = colour_map(quantity, limits)
+        colours = scene.add_values(smooth, "values", table, limits, ambient=0.2)
+        scale_bar(scene, quantity.title, colours, limits, round_step(limits[1] - limits[0]), size)
+        scene.headline(title, 36.0 * min(size[0] / 4.0, size[1] / 3.0) / 400.0)
+        aim(scene, "perspective", [np.asarray(mesh.points)], size)
 
 
 def _tows(net: KinematicNet) -> pv.PolyData:

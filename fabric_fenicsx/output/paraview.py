@@ -16,13 +16,11 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import numpy.typing as npt
-from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-from vtkmodules.vtkCommonCore import vtkDataArray, vtkPoints
-from vtkmodules.vtkCommonDataModel import VTK_LINE, VTK_VERTEX, vtkCellArray, vtkUnstructuredGrid
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
-from fabric_fenicsx.output.files import write_text, write_vtk
+from fabric_fenicsx.output.files import write_bytes, write_text
+from fabric_fenicsx.output.vtk_xml import Packed, packed, xml_file
 from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["TimeSeries"]
@@ -33,6 +31,9 @@ COMPONENTS = {
     "section_moments": ("M1", "M2", "M3"),
 }
 
+
+VERTEX, LINE = 1, 3
+"""VTK's numbers of the cells' shapes."""
 
 HEAD = """<?xml version='1.0' encoding='utf-8'?>
 <VTKFile type="Collection" version="0.1">
@@ -70,11 +71,13 @@ class TimeSeries:
     ) -> None:
         self._folder = Path(folder)
         self._net = net
-        self._grids = {"tows": _grid(net.points, net.cells, VTK_LINE)}
+        self._grids = {"tows": _Grid(net.points, net.cells, LINE)}
+        own = {"tow": net.cell_tow, "family": net.tow_family[net.cell_tow]}
+        self._of_cells = {name: packed(values, small=True) for name, values in own.items()}
         if len(net.crossings):
             places = net.points[net.crossings].mean(axis=1)
             numbers = np.arange(len(places))[:, None]
-            self._grids["crossings"] = _grid(places, numbers, VTK_VERTEX)
+            self._grids["crossings"] = _Grid(places, numbers, VERTEX)
 
         self._folder.mkdir(parents=True, exist_ok=True)
         steps = self._kept(until) if resume else {}
@@ -120,17 +123,16 @@ class TimeSeries:
                 f" the last step in {self._folder}"
             )
         number = last + 1
-        for series, grid in self._grids.items():
-            step = vtkUnstructuredGrid()
-            step.ShallowCopy(grid)  # shares points and cells
-            if series == "tows":
-                _add_tows(step, self._net, snapshot)
-                for name, place in places.items():
-                    step.GetFieldData().AddArray(_array(f"place_of_{name}", np.array([place])))
-            else:
-                _add_crossings(step, self._net, snapshot)
-            step.GetFieldData().AddArray(_array("TimeValue", np.array([snapshot.time])))
-            write_vtk(_file(self._folder, series, number), step)
+        field = {"TimeValue": packed(np.array([float(snapshot.time)]))}
+        path = _file(self._folder, "tows", number)
+        stand = {f"place_of_{n}": packed(np.array([p], dtype=float)) for n, p in places.items()}
+        in_cells = {**_in_cells(snapshot), **self._of_cells}
+        tows = self._grids["tows"]
+        write_bytes(path, tows.file(_at_nodes(snapshot), in_cells, {**stand, **field}))
+        if "crossings" in self._grids:
+            path = _file(self._folder, "crossings", number)
+            at_crossings = _at_crossings(self._net, snapshot)
+            write_bytes(path, self._grids["crossings"].file(at_crossings, {}, field))
         self._last = number, float(snapshot.time)
         for series in self._grids:
             path = self._folder / f"{series}.pvd"
@@ -188,52 +190,60 @@ def _read_collection(path: Path) -> dict[int, float]:
     return steps
 
 
-def _grid(
-    points: npt.NDArray[np.float64], cells: npt.NDArray[np.int64], kind: int
-) -> vtkUnstructuredGrid:
-    """A grid of cells of one kind, points (n, 3), cells (m, points of a cell)."""
-    count, size = cells.shape
-    places = vtkPoints()
-    places.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
-    offsets = np.arange(0, count * size + 1, size, dtype=np.int64)
-    numbers = np.ascontiguousarray(cells, dtype=np.int64).ravel()
-    array = vtkCellArray()
-    array.SetData(
-        numpy_to_vtkIdTypeArray(offsets, deep=True), numpy_to_vtkIdTypeArray(numbers, deep=True)
+class _Grid:
+    """Cells of one kind, the same in all files.
+
+    Args:
+        points: reference places [mm], shape (n, 3).
+        cells: points of each cell, shape (m, points of a cell).
+        kind: VTK's number of their shape.
+    """
+
+    def __init__(
+        self, points: npt.NDArray[np.float64], cells: npt.NDArray[np.int64], kind: int
+    ) -> None:
+        count, size = cells.shape
+        self._counts = {"NumberOfPoints": len(points), "NumberOfCells": count}
+        ends = size * np.arange(1, count + 1)
+        shapes = np.full(count, kind, dtype=np.uint8)
+        connectivity = {"connectivity": cells.ravel(), "offsets": ends, "types": shapes}
+        self._sections = {
+            "Points": {"Points": packed(points, small=True)},
+            "Cells": {name: packed(own, small=True) for name, own in connectivity.items()},
+        }
+
+    def file(
+        self,
+        at_points: Mapping[str, Packed],
+        in_cells: Mapping[str, Packed],
+        field: Mapping[str, Packed],
+    ) -> list[bytes]:
+        """The file of a step with its data."""
+        data = {"PointData": at_points, "CellData": in_cells}
+        return xml_file("UnstructuredGrid", self._counts, {**data, **self._sections}, field)
+
+
+def _named(**arrays: npt.NDArray[np.float64]) -> dict[str, Packed]:
+    return {name: packed(values, COMPONENTS.get(name, ())) for name, values in arrays.items()}
+
+
+def _at_nodes(snapshot: Snapshot) -> dict[str, Packed]:
+    directors = {f"d{i + 1}": snapshot.directors[:, i] for i in range(3)}
+    return _named(
+        displacement=snapshot.displacement, **directors, contact_pressure=snapshot.contact_pressure
     )
-    grid = vtkUnstructuredGrid()
-    grid.SetPoints(places)
-    grid.SetCells(kind, array)
-    return grid
 
 
-def _array(name: str, values: npt.NDArray[np.float64] | npt.NDArray[np.int64]) -> vtkDataArray:
-    array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
-    array.SetName(name)
-    for i, component in enumerate(COMPONENTS.get(name, ())):
-        array.SetComponentName(i, component)
-    return array
+def _in_cells(snapshot: Snapshot) -> dict[str, Packed]:
+    return _named(section_forces=snapshot.section_forces, section_moments=snapshot.section_moments)
 
 
-def _add_tows(grid: vtkUnstructuredGrid, net: Net, snapshot: Snapshot) -> None:
-    at_points, in_cells = grid.GetPointData(), grid.GetCellData()
-    at_points.AddArray(_array("displacement", snapshot.displacement))
-    for i in range(3):
-        at_points.AddArray(_array(f"d{i + 1}", snapshot.directors[:, i]))
-    at_points.AddArray(_array("contact_pressure", snapshot.contact_pressure))
-    in_cells.AddArray(_array("section_forces", snapshot.section_forces))
-    in_cells.AddArray(_array("section_moments", snapshot.section_moments))
-    in_cells.AddArray(_array("tow", net.cell_tow))
-    in_cells.AddArray(_array("family", net.tow_family[net.cell_tow]))
-
-
-def _add_crossings(grid: vtkUnstructuredGrid, net: Net, snapshot: Snapshot) -> None:
+def _at_crossings(net: Net, snapshot: Snapshot) -> dict[str, Packed]:
     shear = np.degrees(snapshot.shear_angle)
-    at_points = grid.GetPointData()
-    displacement = snapshot.displacement[net.crossings].mean(axis=1)
-    at_points.AddArray(_array("displacement", displacement))
-    at_points.AddArray(_array("shear_angle_deg", shear))
-    at_points.AddArray(_array("angle_deg", 90.0 - shear))
-    turn = np.degrees(snapshot.director_turn)
-    at_points.AddArray(_array("director_turn_deg", turn))
-    at_points.AddArray(_array("moment", snapshot.crossing_moment))
+    return _named(
+        displacement=snapshot.displacement[net.crossings].mean(axis=1),
+        shear_angle_deg=shear,
+        angle_deg=90.0 - shear,
+        director_turn_deg=np.degrees(snapshot.director_turn),
+        moment=snapshot.crossing_moment,
+    )

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyvista as pv
-from matplotlib import colormaps
-from matplotlib.colors import ListedColormap
-from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkPolyData
+from vtkmodules.vtkFiltersCore import vtkFeatureEdges, vtkPolyDataNormals, vtkTubeFilter
 
 from fabric_fenicsx.fabric.net import Net
-from fabric_fenicsx.output.canvas import canvas, headline
+from fabric_fenicsx.output.canvas import Canvas, canvas
+from fabric_fenicsx.output.colours import colour_table
 from fabric_fenicsx.output.lines import (
     COLOURS,
     Line,
@@ -26,7 +26,8 @@ from fabric_fenicsx.output.lines import (
     tow_spacing,
 )
 from fabric_fenicsx.output.mirror import whole_sheet
-from fabric_fenicsx.output.surfaces import RevolvedSurface, TriangleSurface, triangulated
+from fabric_fenicsx.output.polydata import poly_data
+from fabric_fenicsx.output.surfaces import RevolvedSurface, TriangleSurface, triangles
 from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["VIEWS", "draw_net"]
@@ -46,12 +47,10 @@ VIEWS = {
 # right and one from behind.
 LIGHTS = (((-1.0, 0.9, 1.6), 0.78), ((1.4, 0.2, 0.8), 0.3), ((0.0, 1.0, -1.0), 0.12))
 
-# Perceptually uniform; without its darkest end, in which the shading of a tube would be lost.
-SEQUENTIAL = ListedColormap(colormaps["viridis"](np.linspace(0.06, 1.0, 256)))
 VIEW_ANGLE = 24.0  # of the perspective [deg]; small, so that the far edge keeps its size
-PIECE = 6.0  # longest straight piece of a tube [pixels]
+SHARP = 40.0  # angle from which two triangles of a tool meet in an edge [deg]
+ROUND = 0.2  # largest distance of a tube's pieces and sides from its curve and circle [pixels]
 PIECES = 4  # of a cell at most
-ROUND = 0.1  # largest distance of a tube's sides from its circle [pixels]
 SIDES = (6, 16)  # of a tube, fewest and most
 
 
@@ -110,53 +109,48 @@ def draw_net(
     if not limits[0] < limits[1]:
         raise ValueError(f"picture: limits are {limits}, not a lower and a higher value")
     step = round_step(limits[1] - limits[0])
-    tools = [(triangulated(surface), surface) for surface in surfaces]
-    clouds = [*(line.points for line in lines), *(np.asarray(mesh.points) for mesh, _ in tools)]
+    tools = [(*triangles(surface), surface) for surface in surfaces]
+    clouds = [*(line.points for line in lines), *(points for points, _, _ in tools)]
     pixel = float(np.ptp(np.concatenate(clouds) if frame is None else frame, axis=0).max())
     tubes = _tubes(lines, 0.12 * tow_spacing(net) if radius is None else radius, pixel / min(size))
 
-    with canvas(path, size, LIGHTS) as plotter:
-        for mesh, surface in tools:
-            plotter.add_mesh(
-                mesh,
-                color=surface.colour,
-                opacity=surface.opacity,
-                smooth_shading=True,
-                split_sharp_edges=True,
-                feature_angle=40.0,
-                specular=0.35,
-                specular_power=25.0,
-                show_scalar_bar=False,
-            )
-            rims = mesh.extract_feature_edges(40.0, manifold_edges=False, non_manifold_edges=False)
-            if rims.n_points:
-                plotter.add_mesh(rims, color="#5f6b78", line_width=size[1] / 600.0)
-        plotter.add_mesh(
-            tubes,
-            scalars="values",
-            cmap=colour_map(quantity, limits),
-            clim=limits,
-            nan_color="#8a8a8a",
-            smooth_shading=True,
-            ambient=0.2,
-            specular=0.18,
-            specular_power=18.0,
-            show_scalar_bar=False,
-        )
-        scale_bar(plotter, quantity.title, limits, step, size)
+    with canvas(path, size, LIGHTS) as scene:
+        for points, cells, surface in tools:
+            mesh, rims = _with_edges(poly_data(points, faces=cells))
+            look = {"opacity": surface.opacity, "specular": 0.35, "specular_power": 25.0}
+            scene.add(mesh, surface.colour, **look)
+            if rims.GetNumberOfPoints():
+                scene.add(rims, "#5f6b78", line_width=size[1] / 1200.0)
+        table = colour_map(quantity, limits)
+        look = {"ambient": 0.2, "specular": 0.18, "specular_power": 18.0}
+        colours = scene.add_values(tubes, "values", table, limits, **look)
+        scale_bar(scene, quantity.title, colours, limits, step, size)
         if title is not None:
-            headline(plotter, title, 18.0 * _unit(size))
-        shown = [tubes.points, *clouds] if frame is None else [frame]
-        aim(plotter, view, shown, size)
+            scene.headline(title, 36.0 * _unit(size))
+        around = vtk_to_numpy(tubes.GetPoints().GetData())
+        aim(scene, view, [around, *clouds] if frame is None else [frame], size)
 
 
-def colour_map(quantity: Quantity, limits: tuple[float, float]) -> Any:
-    """The colours of a scale, a matplotlib colormap: diverging where both signs matter."""
-    diverging = quantity.signed and limits[0] < 0.0 < limits[1]
-    return colormaps["coolwarm"] if diverging else SEQUENTIAL
+def colour_map(quantity: Quantity, limits: tuple[float, float]) -> Array:
+    """The colours of a scale, shape (256, 3): diverging where both signs matter."""
+    return colour_table(quantity.signed and limits[0] < 0.0 < limits[1])
 
 
-def _tubes(lines: list[Line], radius: float, pixel: float) -> pv.PolyData:
+def _with_edges(mesh: vtkPolyData) -> tuple[vtkPolyData, vtkPolyData]:
+    """A surface with normals that keep its sharp edges sharp, and its edges and rims as lines."""
+    normals, edges = vtkPolyDataNormals(), vtkFeatureEdges()
+    normals.SplittingOn()
+    edges.ManifoldEdgesOff()
+    edges.NonManifoldEdgesOff()
+    edges.ColoringOff()
+    for step in (normals, edges):
+        step.SetFeatureAngle(SHARP)
+        step.SetInputData(mesh)
+        step.Update()
+    return normals.GetOutput(), edges.GetOutput()
+
+
+def _tubes(lines: list[Line], radius: float, pixel: float) -> vtkPolyData:
     """Tubes around smooth curves through the nodes of all lines, with point data `values`.
 
     Args:
@@ -164,25 +158,53 @@ def _tubes(lines: list[Line], radius: float, pixel: float) -> pv.PolyData:
         radius: of the tubes [mm].
         pixel: size of a pixel [mm], which nothing needs to be finer than.
     """
-    points, values, polylines, start = [], [], [], 0
+    points, values = [], []
     for line in lines:
         arc = arc_length(line.points)
-        pieces = int(np.clip(np.ceil(np.diff(arc).max() / (PIECE * pixel)), 1, PIECES))
-        fine = np.interp(np.arange((len(arc) - 1) * pieces + 1) / pieces, np.arange(len(arc)), arc)
-        points.append(_through(line.points, arc, fine) if pieces > 1 else line.points)
+        fine = _stations(line.points, arc, ROUND * pixel)
+        points.append(_through(line.points, arc, fine))
         values.append(np.interp(fine, arc, line.values))
-        polylines.append(np.append(len(fine), np.arange(start, start + len(fine))))
-        start += len(fine)
-    curves = pv.PolyData(np.concatenate(points), lines=np.concatenate(polylines))
-    curves["values"] = np.concatenate(values)
+    curves = poly_data(
+        np.concatenate(points),
+        lines=[len(own) for own in points],
+        values={"values": np.concatenate(values)},
+    )
     # A regular polygon of n sides is up to r (1 - cos π/n) inside of its circle.
     sides = np.pi / np.arccos(max(1.0 - ROUND * pixel / radius, 0.0))
-    return curves.tube(radius=radius, n_sides=int(np.clip(np.ceil(sides), *SIDES)), capping=True)
+    tube = vtkTubeFilter()
+    tube.SetInputData(curves)
+    tube.SetRadius(radius)
+    tube.SetNumberOfSides(int(np.clip(np.ceil(sides), *SIDES)))
+    tube.CappingOn()
+    tube.Update()
+    return tube.GetOutput()
+
+
+def _stations(points: Array, arc: Array, near: float) -> Array:
+    """Arc lengths between which the curve through points is straight to within ``near`` [mm].
+
+    An arc that its chord of length h meets at an angle β is up to h β / 4 away from it, and n
+    pieces of it the n²-th part of that.
+    """
+    h = np.diff(arc)
+    chords = np.diff(points, axis=0) / h[:, None]
+    slopes = _slopes(points, arc)
+    bent = np.maximum(
+        np.linalg.norm(slopes[:-1] - chords, axis=1), np.linalg.norm(slopes[1:] - chords, axis=1)
+    )
+    pieces = np.clip(np.ceil(np.sqrt(h * bent / (4.0 * near))), 1, PIECES).astype(int)
+    cell = np.repeat(np.arange(len(h)), pieces)
+    part = np.arange(len(cell)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    return np.append(arc[cell] + part / pieces[cell] * h[cell], arc[-1])
+
+
+def _slopes(points: Array, arc: Array) -> Array:
+    return np.gradient(points, arc, axis=0, edge_order=2 if len(arc) > 2 else 1)
 
 
 def _through(points: Array, arc: Array, fine: Array) -> Array:
     """Cubic Hermite curve through points (n, 3) at their arc lengths, at others (m,)."""
-    slopes = np.gradient(points, arc, axis=0, edge_order=2 if len(arc) > 2 else 1)
+    slopes = _slopes(points, arc)
     k = np.clip(np.searchsorted(arc, fine, side="right") - 1, 0, len(arc) - 2)
     h = np.diff(arc)[k][:, None]
     t = (fine - arc[k])[:, None] / h
@@ -196,33 +218,20 @@ def _unit(size: tuple[int, int]) -> float:
 
 
 def scale_bar(
-    plotter: Any, title: str, limits: tuple[float, float], step: float, size: tuple[int, int]
+    scene: Canvas,
+    title: str,
+    colours: Any,
+    limits: tuple[float, float],
+    step: float,
+    size: tuple[int, int],
 ) -> None:
     """The colour scale on the right, labelled at round values."""
-    unit = _unit(size)
     first, last = np.ceil(limits[0] / step - 1e-9), np.floor(limits[1] / step + 1e-9)
     labels = step * np.arange(first, last + 1.0) + 0.0  # no -0
-    bar = plotter.add_scalar_bar(
-        title=title,
-        vertical=True,
-        position_x=0.87,
-        position_y=0.17,
-        width=0.055,
-        height=0.66,
-        n_labels=len(labels),
-        title_font_size=round(30 * unit),
-        label_font_size=round(28 * unit),
-        unconstrained_font_size=True,
-        font_family="arial",
-        color="#202020",
-    )
-    bar.SetVerticalTitleSeparation(round(30 * unit))
-    bar.SetUseCustomLabels(True)
-    bar.SetCustomLabels(numpy_to_vtk(labels, deep=True))
-    bar.SetLabelFormat("  %.4g")  # a text pad would shift the labels along the bar
+    scene.scale(title, colours, labels, _unit(size))
 
 
-def aim(plotter: Any, view: str, clouds: list[Array], size: tuple[int, int]) -> None:
+def aim(scene: Canvas, view: str, clouds: list[Array], size: tuple[int, int]) -> None:
     """Set the camera so that all points fill the frame left of the scale and below the title."""
     left, right, bottom, top = -0.94, 0.66, -0.93, 0.84  # of the frame, in -1..1
     to_eye, up = (np.array(v) for v in VIEWS[view])
@@ -257,12 +266,5 @@ def aim(plotter: Any, view: str, clouds: list[Array], size: tuple[int, int]) -> 
             fill = max(np.ptp(p) / (right - left), np.ptp(q) / (top - bottom))
             distance = max(distance * fill**0.7, nearest)
     focus = middle + x * u + y * v
-    camera = plotter.camera
-    camera.focal_point = tuple(focus)
-    camera.position = tuple(focus + (distance + 2.0 * reach * parallel) * w)
-    camera.up = tuple(v)
-    camera.view_angle = VIEW_ANGLE
-    if parallel:
-        camera.enable_parallel_projection()
-        camera.parallel_scale = half * distance
-    plotter.renderer.ResetCameraClippingRange()
+    position = focus + (distance + 2.0 * reach * parallel) * w
+    scene.look(focus, position, v, VIEW_ANGLE, half * distance if parallel else None)

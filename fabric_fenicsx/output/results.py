@@ -15,15 +15,16 @@ import numpy.typing as npt
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
-from fabric_fenicsx.output.files import write_npz, write_vtk
+from fabric_fenicsx.output.files import write_bytes, write_npz
 from fabric_fenicsx.output.mirror import whole_sheet
 from fabric_fenicsx.output.surfaces import (
     OTHER_COLOUR,
     TOOL_COLOURS,
     RevolvedSurface,
     TriangleSurface,
-    triangulated,
+    triangles,
 )
+from fabric_fenicsx.output.vtk_xml import packed, xml_file
 from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["Results", "read_net", "read_results", "seen_arrays", "write_setup"]
@@ -130,7 +131,20 @@ def write_setup(
         old.unlink()
     for tool in tools:
         shapes.mkdir(exist_ok=True)
-        write_vtk(shapes / f"{tool.name}.vtp", triangulated(tool))
+        points, cells = triangles(tool)
+        write_bytes(shapes / f"{tool.name}.vtp", _triangles_file(points, cells))
+
+
+def _triangles_file(points: npt.NDArray[np.float64], cells: npt.NDArray[np.int64]) -> list[bytes]:
+    """Triangles as VTK's XML file of polygons."""
+    ends = 3 * np.arange(1, len(cells) + 1)
+    faces = {"connectivity": np.asarray(cells, dtype=np.int64).ravel(), "offsets": ends}
+    sections = {
+        "Points": {"Points": packed(points, small=True)},
+        "Polys": {name: packed(own, small=True) for name, own in faces.items()},
+    }
+    counts = {"NumberOfPoints": len(points), "NumberOfPolys": len(cells)}
+    return xml_file("PolyData", counts, sections, {})
 
 
 def read_net(path: Path) -> Net:

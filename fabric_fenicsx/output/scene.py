@@ -17,13 +17,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib import colormaps
-from matplotlib.colors import to_rgb
 
 from fabric_fenicsx.fabric.net import Net
+from fabric_fenicsx.output.colours import colour_table, rgb
 from fabric_fenicsx.output.files import write_text
 from fabric_fenicsx.output.lines import COLOURS, round_step, scale_limits, tow_lines, tow_spacing
-from fabric_fenicsx.output.pictures import SEQUENTIAL
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
 from fabric_fenicsx.solving.snapshot import Snapshot
 
@@ -85,7 +83,7 @@ def write_scene(
             for at, (_, snapshot, tools) in zip(whole, frames, strict=True)
         ],
         "colours": [_coloured(name, frames) for name in order],
-        "maps": [_packed(_map(SEQUENTIAL)), _packed(_map(colormaps["coolwarm"]))],
+        "maps": [_packed(_map(diverging)) for diverging in (False, True)],
         "tools": [_tool(tool, tool.name in hidden) for tool in frames[-1][2]],
     }
     text = files("fabric_fenicsx.output").joinpath("scene.html").read_text(encoding="utf-8")
@@ -127,7 +125,7 @@ def _tool(tool: TriangleSurface, hidden: bool) -> dict[str, Any]:
     return {
         "name": tool.name,
         "hidden": hidden,
-        "colour": [*to_rgb(tool.colour), tool.opacity],
+        "colour": [*rgb(tool.colour), tool.opacity],
         "points": _packed(np.asarray(mesh.points, dtype="<f4")),
         "normals": _packed(np.asarray(mesh.point_data["Normals"], dtype="<f4")),
         "cells": _packed(cells.astype("<u4")),
@@ -135,9 +133,9 @@ def _tool(tool: TriangleSurface, hidden: bool) -> dict[str, Any]:
     }
 
 
-def _map(colours: Any) -> npt.NDArray[np.uint8]:
+def _map(diverging: bool) -> npt.NDArray[np.uint8]:
     """256 colours, shape (256, 3)."""
-    return np.rint(255.0 * colours(np.linspace(0.0, 1.0, 256))[:, :3]).astype(np.uint8)
+    return np.rint(255.0 * colour_table(diverging)).astype(np.uint8)
 
 
 def _packed(values: npt.NDArray[Any]) -> str:

@@ -13,7 +13,14 @@ if TYPE_CHECKING:
 
     from fabric_fenicsx.mechanics.tools import Tool
 
-__all__ = ["TOOL_COLOURS", "RevolvedSurface", "TriangleSurface", "tool_surface", "triangulated"]
+__all__ = [
+    "TOOL_COLOURS",
+    "RevolvedSurface",
+    "TriangleSurface",
+    "tool_surface",
+    "triangles",
+    "triangulated",
+]
 
 TOOL_COLOURS = {"punch": "#8aa0b8", "die": "#b8a58a", "holder": "#cfd6dd"}
 """Of tools with these names; others are grey."""
@@ -106,26 +113,44 @@ def tool_surface(
     return RevolvedSurface(tool.name, tool.profile(extent), place, colour)
 
 
-def triangulated(surface: RevolvedSurface | TriangleSurface) -> pv.PolyData:
-    """The surface as a mesh of triangles in its place [mm]."""
+def triangles(
+    surface: RevolvedSurface | TriangleSurface,
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """The surface in its place: points [mm], shape (n, 3), and triangles, shape (m, 3)."""
     if isinstance(surface, RevolvedSurface):
         return _revolved(surface)
+    return np.asarray(surface.points, dtype=np.float64) + surface.place, surface.cells
+
+
+def triangulated(surface: RevolvedSurface | TriangleSurface) -> pv.PolyData:
+    """The same as a mesh of pyvista."""
     import pyvista as pv
 
-    faces = np.insert(surface.cells, 0, 3, axis=1).ravel()
-    return pv.PolyData(np.asarray(surface.points, dtype=np.float64) + surface.place, faces=faces)
+    points, cells = triangles(surface)
+    return pv.PolyData(points, faces=np.insert(cells, 0, 3, axis=1).ravel())
 
 
-def _revolved(surface: RevolvedSurface, pieces: int = 180) -> pv.PolyData:
-    """The surface as a mesh of triangles."""
-    import pyvista as pv
-
-    angle = np.linspace(0.0, 2.0 * np.pi, pieces + 1)
-    r, z = np.asarray(surface.profile, dtype=np.float64).T
+def _revolved(
+    surface: RevolvedSurface, pieces: int = 180
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """Points and triangles of a turned profile, closed around the axis and at its poles."""
+    profile = np.asarray(surface.profile, dtype=np.float64)
+    same = 1e-9 * float(np.abs(profile).max())
+    moved = np.linalg.norm(np.diff(profile, axis=0), axis=1) > same
+    profile = profile[np.append(True, moved)]
+    r, z = profile.T
+    angle = 2.0 * np.pi * np.arange(pieces) / pieces
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     points = r[None, :, None] * around[:, None] + z[None, :, None] * np.array([0.0, 0.0, 1.0])
-    corner = (np.arange(pieces)[:, None] * len(r) + np.arange(len(r) - 1)).ravel()
-    quads = corner[:, None] + np.array([0, len(r), len(r) + 1, 1])
-    faces = np.insert(quads, 0, 4, axis=1)
-    mesh = pv.PolyData(points.reshape(-1, 3) + surface.centre, faces=faces.ravel())
-    return mesh.triangulate().clean(tolerance=1e-9)  # closes the seam and the pole
+
+    number = np.arange(pieces * len(r)).reshape(pieces, len(r))
+    number[:, r <= same] = number[0, r <= same]  # a pole is one point
+    if len(r) > 2 and np.linalg.norm(profile[-1] - profile[0]) <= same:
+        number[:, -1] = number[:, 0]
+    further = np.roll(number, -1, axis=0)
+    a, b, c, d = number[:, :-1], further[:, :-1], further[:, 1:], number[:, 1:]
+    both = np.stack([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)], axis=-2)
+    cells = both.reshape(-1, 3)
+    flat = (cells == np.roll(cells, 1, axis=1)).any(axis=1)
+    used, cells = np.unique(cells[~flat], return_inverse=True)
+    return points.reshape(-1, 3)[used] + surface.centre, cells.reshape(-1, 3)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pyvista as pv
-from matplotlib.colors import to_rgb
 from scipy.interpolate import CubicHermiteSpline
 
 from fabric_fenicsx.fabric.net import WARP, Net
-from fabric_fenicsx.output.canvas import canvas, headline
+from fabric_fenicsx.output.canvas import Canvas, canvas
+from fabric_fenicsx.output.colours import rgb
 
 __all__ = ["draw_weave"]
 
@@ -58,22 +57,16 @@ def draw_weave(
         # The less light, the deeper between the tows.
         depth = np.clip((top - ribbon.points[:, 2]) / (1.7 * heights.max()), 0.0, 1.0)
         light = fibres * (1.12 - 0.85 * depth)
-        colour = np.array(to_rgb(COLOURS[0 if family == WARP else 1]))
+        colour = np.array(rgb(COLOURS[0 if family == WARP else 1]))
         shades = np.clip(colour * light[:, None], 0.0, 1.0)
         ribbon["colour"] = (255.0 * shades).astype(np.uint8)
-    with canvas(path, size, LIGHTS) as plotter:
-        plotter.add_mesh(
-            pv.merge(ribbons, merge_points=False),
-            scalars="colour",
-            rgb=True,
-            smooth_shading=True,
-            ambient=0.14,
-            specular=0.32,
-            specular_power=26.0,
-        )
+    with canvas(path, size, LIGHTS) as scene:
+        mesh = pv.merge(ribbons, merge_points=False).compute_normals(cell_normals=False)
+        look = {"ambient": 0.14, "specular": 0.32, "specular_power": 26.0}
+        scene.add_shades(mesh, "colour", **look)
         if title is not None:
-            headline(plotter, title, size[1] / 46)
-        _aim(plotter, net.points, size)
+            scene.headline(title, size[1] / 23)
+        _aim(scene, net.points, size)
 
 
 def _ribbon(net: Net, tow: int, width: float, height: float) -> pv.PolyData:
@@ -102,7 +95,7 @@ def _ribbon(net: Net, tow: int, width: float, height: float) -> pv.PolyData:
     return pv.PolyData(rings.reshape(-1, 3), faces=np.concatenate([quads.ravel(), *caps]))
 
 
-def _aim(plotter: Any, points: Array, size: tuple[int, int]) -> None:
+def _aim(scene: Canvas, points: Array, size: tuple[int, int]) -> None:
     """Look at the whole sheet from the left front, below the title."""
     to_eye = _unit(np.array(TO_EYE))
     u = _unit(np.cross(UP, to_eye))
@@ -111,12 +104,8 @@ def _aim(plotter: Any, points: Array, size: tuple[int, int]) -> None:
     focus = points.mean(axis=0) + (a.max() + a.min()) / 2.0 * u + (b.max() + b.min()) / 2.0 * v
     half = max(np.ptp(b) / 2.0 / 0.8, np.ptp(a) / 2.0 / 0.88 * size[1] / size[0])
     focus = focus + 0.07 * half * v
-    camera = plotter.camera
-    camera.focal_point = tuple(focus)
-    camera.position = tuple(focus + 12.0 * half * to_eye)
-    camera.up = tuple(v)
-    camera.view_angle = float(np.degrees(2.0 * np.arctan(1.06 / 12.0)))
-    plotter.renderer.ResetCameraClippingRange()
+    angle = float(np.degrees(2.0 * np.arctan(1.06 / 12.0)))
+    scene.look(focus, focus + 12.0 * half * to_eye, v, angle)
 
 
 def _unit(vectors: Array) -> Array:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ..fabric.axes import axes_shear, shear_at
 from ..fabric.net import Net
-from ..parallel import neighbour
+from ..parallel import from_root, neighbour
 from .common import Session, extend, lowest, write_table
 from .discretisation_error import recovered_error
 from .drape import DrapeCase, mirrors, rim
@@ -28,20 +29,13 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
     summary = outcome.summary
     snapshot, net = outcome.last, model.net
     if snapshot is not None:
-        summary["health"] = drape_health(
-            net,
-            snapshot,
-            outcome.gaps,
-            outcome.rows,
-            layer=case.contact.layer_mm,
-            rim=rim(case),
-            squeezed=_squeezed(case),
-            axis=(case.punch_offset_x_mm, case.punch_offset_y_mm),
-            quarter=case.symmetry == "quarter",
-            stiffness=model.stiffness,
-            iterations=summary["newton_iterations"],
-            wasted=summary["wasted_iterations"],
+        # One rank asks what the tools alone would make of the sheet, while rank 0 looks at it.
+        beside = neighbour(session.comm)
+        known = _known(case, session, outcome) if session.comm.rank == beside else None
+        summary["health"], summary["discretisation_error"], angles = from_root(
+            session.comm, lambda: _looked_at(case, model, snapshot, outcome)
         )
+        known = session.comm.bcast(known, root=beside)
         _write_crossings(session, net, snapshot)
         row = outcome.rows[-1]
         quantities = {
@@ -52,27 +46,54 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             "largest_shear_angle_deg": row["largest_shear_deg"],
             "lowest_point_mm": lowest(net, snapshot.displacement),
             "kinetic_over_stored_energy": summary["health"]["kinetic_over_stored_energy"],
-            "points": _points(case, session, net, outcome),
+            "points": _points(case, angles, known),
         }
-        summary["discretisation_error"] = recovered_error(net, snapshot, mirrors(case))
         if session.pictures:
             _draw(case, session, model, snapshot)
     return extend(summary, quantities, session)
 
 
-def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[dict[str, Any]]:
-    """The case's points with the acute angle there, as a protractor on a photograph gives it."""
-    snapshot = outcome.last
-    if not case.points or snapshot is None:
-        return []
+def _looked_at(
+    case: DrapeCase, model: Model, snapshot: Snapshot, outcome: Run
+) -> tuple[dict[str, Any], dict[str, Any], npt.NDArray[np.float64]]:
+    """Health and discretisation error, and the angles at the case's points [rad], (n, 3)."""
+    summary, net = outcome.summary, model.net
+    health = drape_health(
+        net,
+        snapshot,
+        outcome.gaps,
+        outcome.rows,
+        layer=case.contact.layer_mm,
+        rim=rim(case),
+        squeezed=_squeezed(case),
+        axis=(case.punch_offset_x_mm, case.punch_offset_y_mm),
+        quarter=case.symmetry == "quarter",
+        stiffness=model.stiffness,
+        iterations=summary["newton_iterations"],
+        wasted=summary["wasted_iterations"],
+    )
+    angles = np.zeros((0, 3))
+    if case.points:
+        places = np.array([[p.x_mm, p.y_mm] for p in case.points])
+        kinds = (axes_shear(snapshot.axes), snapshot.shear_angle, snapshot.director_turn)
+        quarter = case.symmetry == "quarter"
+        angles = shear_at(net, np.column_stack(kinds), places, quarter=quarter)
+    return health, recovered_error(net, snapshot, mirrors(case)), angles
+
+
+def _known(case: DrapeCase, session: Session, outcome: Run) -> list[float | None]:
+    """What a kinematic net has at the case's points; None where it has nothing."""
+    if not case.points or not outcome.completed:
+        return [None] * len(case.points)
     from .kinematic import known_angles
 
-    places = np.array([[p.x_mm, p.y_mm] for p in case.points])
-    quarter = case.symmetry == "quarter"
-    angles = (axes_shear(snapshot.axes), snapshot.shear_angle, snapshot.director_turn)
-    at = shear_at(net, np.column_stack(angles), places, quarter=quarter)
-    totals, shears, directors = np.degrees(at).T
-    known = known_angles(case, session.base) if outcome.completed else [None] * len(places)
+    return known_angles(case, session.base)
+
+
+def _points(
+    case: DrapeCase, angles: npt.NDArray[np.float64], known: list[float | None]
+) -> list[dict[str, Any]]:
+    """The case's points with the acute angle there, as a protractor on a photograph gives it."""
     return [
         {
             **point.model_dump(exclude_none=True),
@@ -81,8 +102,8 @@ def _points(case: DrapeCase, session: Session, net: Net, outcome: Run) -> list[d
             "director_turn_deg": round(float(turn), 3),
             **({} if kinematic is None else {"kinematic_deg": kinematic}),
         }
-        for point, total, shear, turn, kinematic in zip(
-            case.points, totals, shears, directors, known, strict=True
+        for point, (total, shear, turn), kinematic in zip(
+            case.points, np.degrees(angles), known, strict=True
         )
     ]
 

@@ -31,7 +31,7 @@ __all__ = ["BLOCK", "Discretisation"]
 
 #: Cells of a net from which on kernels are compiled for several cells at a time as well, which
 #: takes up to some seconds for each, once: those of each iteration, and those of each step.
-MANY_OFTEN, MANY = 1000, 4000
+MANY_OFTEN, MANY = 560, 4000
 
 #: PETSc's own copy of each communicator that nets are on, by its handle.
 _COPIES: dict[int, PETSc.Comm] = {}

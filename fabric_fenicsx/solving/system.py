@@ -15,7 +15,7 @@ import numpy.typing as npt
 from .. import _dolfinx
 from .._dolfinx import Function
 from ..mechanics.beam import SectionLaw, linear_section, linearised_forces
-from ..mechanics.terms import Term, side_by_side
+from ..mechanics.terms import Term, side_by_side, total
 from .discretisation import BLOCK, Discretisation
 
 __all__ = ["System"]
@@ -89,7 +89,7 @@ class System:
         """The compiled sum of one part of all terms on a mesh; None without any. Collective."""
         parts = [getattr(term, part) for term in self.terms if term.where == mesh]
         forms = [form for form in parts if form is not None]
-        return self._compile(sum(forms[1:], start=forms[0]) if forms else None, often=True)
+        return self._compile(total(forms) if forms else None, often=True)
 
     def _compile(self, form: Any | None, *, often: bool = False) -> Any:
         """Compile a form; a rank without cells for it has None. Collective."""
