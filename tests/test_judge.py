@@ -1,5 +1,7 @@
 """What a model may be believed by: noise as it was stated, held-out runs that are foretold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear import Linear, readings
@@ -59,6 +61,25 @@ def test_noise_beyond_what_was_stated():
         assert judge.doubtful_noise(model) is more
     judge, model = judged(stated=None, scatter=2.0 * SIGMA)
     assert not judge.doubtful_noise(model)
+
+
+def test_noise_of_far_more_than_was_stated_accounts_for_nothing():
+    for scatter, much in ((2.0 * SIGMA, False), (3.0 * SIGMA, True)):
+        judge, model = judged(scatter=scatter)
+        assert judge.fits(model, model) is not much
+    judge, model = judged(stated=None, scatter=3.0 * SIGMA)
+    assert judge.fits(model, model)
+
+
+@pytest.mark.parametrize(
+    ("correlation", "beside", "alone"), [(0.3, 0, 0), (0.7, 1, 0), (0.9, 1, 1)]
+)
+def test_slow_noise_is_doubted_sooner_beside_a_name(correlation, beside, alone):
+    judge, model = judged(stated=None)
+    variances = replace(model.estimate.variances, noise=Noise(SIGMA, correlation=correlation))
+    slow = replace(model, estimate=replace(model.estimate, variances=variances))
+    assert judge.doubtful_noise(slow) == bool(beside)
+    assert judge.doubtful_noise(replace(slow, effects=())) == bool(alone)
 
 
 @pytest.mark.parametrize(

@@ -133,9 +133,19 @@ def wandering_zero(t, D, speed, run):
     return force_of(D - 0.05 * run, speed)
 
 
+def dusty_crossings(t, D, speed, run):
+    """A friction of 0.02 N (1 + runs before), which sticks over no angle that is seen."""
+    way = np.sign(speed)
+    for k in range(1, len(way)):
+        way[k] = way[k] or way[k - 1]
+    theta = np.arccos((np.sqrt(2.0) + D / FRAME) / 2.0)
+    return force_of(D, speed) + 0.02 * (1.0 + run) * way * FABRIC**2 / (FRAME * np.sin(theta))
+
+
 @pytest.mark.parametrize(
     ("measured", "term", "slope"),
     [
+        (dusty_crossings, "dissipative_moment_of_run", 0.02),
         (wearing_spring, "elastic_moment_of_run", -0.04),
         (wandering_zero, "travel_of_run", -0.05),
     ],
@@ -148,7 +158,7 @@ def test_what_changes_from_run_to_run(tmp_path, measured, term, slope):
     )
     readings, white = experiment.readings, Variances(Noise(NOISE))
     rows, holdout = readings.fit, readings.holdout & readings.usable
-    start = BASE | {p.name: 1e-3 for p in variant.parameters}
+    start = BASE | {p.name: p.starts[0] if p.starts else 1e-3 for p in variant.parameters}
     found = fit(experiment, (variant,), start, rows, white)
     assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
     assert found.rms(rows) < 1.1 * NOISE and found.rms(holdout) < 1.2 * NOISE
@@ -324,6 +334,7 @@ def test_derivatives_of_what_remembers(tmp_path, name):
         ("travel_of_run", "linear"),
         ("elastic_moment_of_run", "saturation"),
         ("viscous_moment_of_run", "2 coefficients"),
+        ("dissipative_moment_of_run", "linear"),
     ],
 )
 def test_the_file_is_the_term(tmp_path, name, label):

@@ -220,7 +220,8 @@ class Judge:
     def doubtful_noise(self, model: Model) -> bool:
         """Whether noise is more than was stated or, where none was, as slow as a misfit."""
         if self.given is None:
-            return model.estimate.variances.noise.correlation > CRITERIA.slow_noise
+            slow = CRITERIA.slow_beside if model.effects else CRITERIA.slow_noise
+            return model.estimate.variances.noise.correlation > slow
         return self.misfit(model).reading > CRITERIA.scatter * self.given
 
     def fits(self, model: Model, baseline: Model) -> bool:

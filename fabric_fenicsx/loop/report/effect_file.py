@@ -78,7 +78,7 @@ EFFECTS = [ff.Effect("{name}", "{test}", "{about}", (FOUND,), of_fabric=False)]
 '''
 
 FOUND_OF_THE_RIG = 'ff.of_the_rig("as found", (AMOUNT,), "{acts_on}", "{variable}", added{options})'
-FOUND_OF_THE_RUN = 'ff.of_the_run("as found", (AMOUNT,), "{base}", added)'
+FOUND_OF_THE_RUN = 'ff.of_the_run("as found", (AMOUNT,), "{base}", added{options})'
 
 OF_A_STRIP = """
 import fabric_fenicsx as ff
@@ -140,11 +140,11 @@ def effect_file(term: Discovered, titles: str) -> str:
         carried: str = getattr(term.variant, "carried", "")
         words["carried"] = f'\n            carried="{carried}",' if carried else ""
         return (HEAD + LAW).format(numbers=lines, **words)
-    options = {key: numbers.pop(key) for key in ("memory", "turning", "slow") if key in numbers}
+    kept = ("memory", "turning", "slow", "stick_angle")
+    more = "".join(f", {key}={numbers.pop(key)!r}" for key in kept if key in numbers)
     if "of" in numbers:
-        words["found"] = FOUND_OF_THE_RUN.format(base=numbers.pop("of"))
+        words["found"] = FOUND_OF_THE_RUN.format(base=numbers.pop("of"), options=more)
     else:
-        more = "".join(f", {key}={value!r}" for key, value in options.items())
         rig = {"variable": numbers.pop("variable"), "options": more, **words}
         words["found"] = FOUND_OF_THE_RIG.format(**rig)
     numbers["kind"], constant = numbers.pop("shape"), numbers.pop("constant", 0.0)

@@ -99,15 +99,22 @@ def _by_run(largest: Mapping[str, float]) -> Iterator[Effect]:
     reach = largest.get("run_of_specimen", 0.0)
     if reach < FEWEST_BEFORE:
         return
-    for base, also in {"elastic": (), "viscous": ("rate",)}.items():
+    bases = {"elastic": (), "viscous": ("rate",), "dissipative": ("direction",)}
+    for base, also in bases.items():
         name = f"{base}_moment_of_run"
+        fixed: dict[str, Any] = {"of": base}
+        fixed |= remembering(name, base, "run", largest)
+        if base in FRICTION:
+            fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
         forms = []
         for label, coefficients, numbers in over_runs(name):
-            own = numbers | {"coefficients": coefficients}
+            own = fixed | numbers | {"coefficients": coefficients}
             value = partial(factor, own)
-            shape = Shape(X["run"], Y[base], reach, value, own | {"of": base})
-            share = partial(_share, value, reach)
-            forms.append(of_the_run(label, fitted(own), base, share, shape=shape))
+            shape = Shape(X["run"], Y.get(base, "moment_N"), reach, value, own)
+            share, stick = partial(_share, value, reach), own.get("stick_angle", 0.0)
+            forms.append(
+                of_the_run(label, fitted(own), base, share, stick_angle=stick, shape=shape)
+            )
         yield Effect(
             name,
             "picture_frame",
@@ -129,21 +136,26 @@ def of_the_run(
     base: str,
     share: Callable[[Values, Any], Any],
     *,
+    stick_angle: Any = 0.0,
     shape: Shape | None = None,
 ) -> FrameVariant:
-    """A form of what a moment of the baseline changes by from one run of a specimen to the next.
+    """A form of what a moment changes by from one run of a specimen to the next.
 
     Args:
         label: what tells it from other forms.
         parameters: its numbers.
-        base: "elastic", of the spring, or "viscous", of the rate.
+        base: "elastic", of the spring, "viscous", of the rate, or "dissipative", a friction of 1.
         share: how many times that is added, from the parameters and how many runs were before.
+        stick_angle: of a friction [rad], or the parameter that is one.
         shape: of a term without a formula.
     """
 
     def laws(values: Values) -> tuple[CrossingLaw, ...]:
         if base == "viscous":
             return (LinearDashpot(1.0),)
+        if base in FRICTION:
+            stick, one = valued(stick_angle, values), {"coefficients": (0.0,), "constant": 1.0}
+            return (ShapedLaw(base, "angle", 1.0, **one, stick_angle=stick),)  # type: ignore[arg-type]
         return (PolynomialSpring(k1=values["k1_N"], k3=values["k3_N"]),)
 
     of_baseline = ("k1_N", "k3_N") if base in OF_ELASTIC else ()
