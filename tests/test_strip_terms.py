@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
+from ufl import as_ufl
 
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.noise import Noise
@@ -320,3 +321,34 @@ def test_zeros_of_runs_are_a_term(tmp_path):
     values |= dict(zip(names, table["height_mm"], strict=True))
     same, _ = again.predict(own.variants, values)
     assert same == pytest.approx(found.expected, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("term", "made"),
+    [
+        ("bending_moment_of_run", lambda run: {"stiffer": lambda s: np.exp(-0.1 * run)}),
+        ("rest_curvature_of_run", lambda run: {"rest": lambda s: 4e-4 * run}),
+    ],
+)
+def test_a_strip_that_is_handled_changes_from_run_to_run(term, made):
+    """The right term leaves what a tow is off the elastica, and is as large as was put in."""
+    lengths = (LENGTH, 150.0, 200.0, LENGTH, 150.0)
+    each = [strips((length,), count=12, **made(k)) for k, length in enumerate(lengths)]
+    runs = tuple(
+        replace(one.runs[0], file=f"{k}.csv", holdout=k == 3) for k, one in enumerate(each)
+    )
+    experiment = Cantilever([replace(each[0], runs=runs)])
+    variant = form_of(experiment, term, "linear")
+    readings, white = experiment.readings, Variances(Noise(0.05))
+    start = {"C1_MPa": C1} | {p.name: 0.0 for p in variant.parameters}
+    without = fit(experiment, (), {"C1_MPa": C1}, readings.fit, white)
+    found = fit(experiment, (variant,), start, readings.fit, white)
+    assert without.rms(readings.fit) > 0.5
+    assert found.rms(readings.fit) < 0.03 and found.rms(readings.holdout) < 0.03
+    last = found.values[f"{term}_1"] / 4.0
+    if term.startswith("bending"):
+        assert last == pytest.approx(0.1, rel=0.02)
+    else:
+        assert variant.shape.reach == 4.0
+        bend = float(as_ufl(variant.shape.value({f"{term}_0": 0.0, f"{term}_1": 1.0}, 1.0)))
+        assert last * bend == pytest.approx(4e-4, rel=0.02)

@@ -105,6 +105,7 @@ class HangingTow:
         width, height: of the tow's section [mm].
         spacing: of the tows [mm].
         weight: of the strip per area [N/mm²].
+        run: how many runs of its specimen were before.
 
     Attributes:
         arc: of the nodes [mm], (n,).
@@ -113,9 +114,16 @@ class HangingTow:
     """
 
     def __init__(
-        self, length: float, width: float, height: float, spacing: float, weight: float
+        self,
+        length: float,
+        width: float,
+        height: float,
+        spacing: float,
+        weight: float,
+        run: int = 0,
     ) -> None:
-        self.length, self._spacing, self._weight = length, spacing, weight
+        self.length, self.run = length, run
+        self._spacing, self._weight = spacing, weight
         section = RectangularSection(width, height, weight * spacing / (width * height), 1.0)
         t = np.linspace(0.0, 1.0, CELLS + 1)
         # Cells by the clamp, where strips bend most, are the shortest.
@@ -142,7 +150,11 @@ class HangingTow:
         self._cells = _dolfinx.cell_dofs(self._moment.function_space)[:, 0]
         self._order = self.model.disc.local_cells
         middle = (self.arc[1:] + self.arc[:-1])[self._order] / 2.0
-        self._along = {"s": Varying(middle), "length": Varying(np.full(CELLS, length))}
+        self._along = {
+            "s": Varying(middle),
+            "length": Varying(np.full(CELLS, length)),
+            "run": Varying(np.full(CELLS, float(run))),
+        }
         self._even_mass = fields.mass.x.array.copy()
         self._even_weights = self._weights = self._at_nodes(np.ones(CELLS))
         self._weight_slopes: dict[str, Array] = {}

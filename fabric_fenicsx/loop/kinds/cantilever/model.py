@@ -33,7 +33,7 @@ from ...measurement.schema import Measurement
 from .effects import CANTILEVER_EFFECTS
 from .hanging import HangingTow, Laws, Shape, sum_of
 from .measured_line import scatter_of_x, smooth_line
-from .terms import terms
+from .terms import FEWEST_BEFORE, terms
 from .variant import StripVariant
 
 __all__ = ["Cantilever"]
@@ -53,7 +53,7 @@ FAR = 10
 #: Points on a predicted line among which the nearest to a reading is looked for.
 FINE = 400
 
-PLACE = ("s", "length")
+PLACE = ("s", "length", "run")
 LAWS: dict[str, tuple[str, tuple[str, ...], bool]] = {
     "moment": ("moment", ("kappa",), False),
     "unloaded": ("unloaded", PLACE, False),
@@ -172,6 +172,7 @@ class Cantilever:
             "x": float(np.abs(x[rows]).max()),
             "z": float(np.abs(self._observed[rows]).max()),
             "stiffness_per_C1": self.stiffness_per_C1,
+            "runs": float(np.asarray(self._before)[self._run[rows]].max()),
         }
         return terms(ranges, np.unique(self._run[rows]).tolist())
 
@@ -198,6 +199,9 @@ class Cantilever:
         keys: list[tuple[int, int, tuple[Any, ...]]] = []
         specimens = specimens_of(measurements)
         number = 0
+        # Runs that nothing can be told by share their strips.
+        many = {s for s in specimens if list(specimens).count(s) > FEWEST_BEFORE}
+        self._before: list[int] = []
         for m in measurements:
             tow, spacing = m.fabric.tow, m.fabric.tow_spacing_mm
             # kg/m² is 1e-9 tonne/mm².
@@ -209,12 +213,14 @@ class Cantilever:
                 columns = [c[n][order] for n in ("length_mm", "s_mm", "x_mm", "z_mm")]
                 table.append(np.stack(columns))
                 run_of.append(np.full(run.count, number, dtype=np.int64))
+                earlier = int(np.sum(np.asarray(specimens[:number]) == specimens[number]))
+                self._before.append(earlier if specimens[number] in many else 0)
                 for length in columns[0]:
                     size = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
-                    key = (*size, m.rig.upside_down)
+                    key = (*size, self._before[number], m.rig.upside_down)
                     keys.append((specimens[number], number, key))
                     if key not in tows:
-                        tows[key] = HangingTow(*size)
+                        tows[key] = HangingTow(*size, self._before[number])
                 number += 1
         self._length, self._arc, x, self._observed = np.concatenate(table, axis=1)
         self._run = np.concatenate(run_of)
@@ -323,6 +329,7 @@ class Cantilever:
             "from_the_clamp_mm": np.hypot(self._distance, self._observed),
             "height_mm": np.abs(self._observed),
             "run": self._run + 1.0,
+            "runs_before": np.asarray(self._before, dtype=float)[self._run],
         }
         # Of the curvature there are no readings.
         return known.get(variant.shape.x if variant.shape else "", arc)
@@ -374,6 +381,7 @@ class Cantilever:
         clamp = {
             "s": Varying(np.zeros_like(kappa)),
             "length": Varying(np.full_like(kappa, longest)),
+            "run": Varying(np.zeros_like(kappa)),
         }
         moment, slopes = values["C1_MPa"] * per_C1 * kappa, {"C1_MPa": per_C1 * kappa}
         for own in laws.moments:
@@ -491,6 +499,7 @@ class Cantilever:
             "z": Varying(shape.z, {name: slope[1] for name, slope in shape.slopes.items()}),
             "s": Varying(own.tow.arc),
             "length": Varying(np.full_like(shape.x, own.tow.length)),
+            "run": Varying(np.full_like(shape.x, own.tow.run)),
         }
         for v in cameras:
             key = (v, "camera", False)

@@ -30,7 +30,7 @@ from ....mechanics.scalars import numpy_function, symbol
 from ...inference.effects import Effect, Shape, Values, of_run
 from .variant import StripVariant
 
-__all__ = ["strip_term", "terms"]
+__all__ = ["FEWEST_BEFORE", "strip_term", "terms"]
 
 #: Numbers of coefficients of a spline.
 SPLINES = (1, 2)
@@ -40,6 +40,10 @@ STEPS, BUMPS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 WIDTH, BUMP_WIDTHS = 0.03, (0.03, 0.1)
 #: Decays from the clamp or from the free end, as shares of it.
 DECAYS = (0.05, 0.2)
+#: Runs before another that a term by the run needs: what two runs differ by is anything.
+FEWEST_BEFORE = 2
+#: Over how many runs something settles, as a share of them.
+FADING = (0.3, 1.0)
 #: Where flexibility is as without a term: about the middle of where strips bend, so that B is
 #: the stiffness there.
 MIDDLE = 0.2
@@ -69,10 +73,11 @@ def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
 
     Args:
         ranges: largest value in the fitted readings of "length", "x", "z" [mm] and of the
-            baseline's "curvature" [1/mm]; the "stiffness_per_C1" of the strips [mm³].
+            baseline's "curvature" [1/mm]; the "stiffness_per_C1" of the strips [mm³]; how many
+            "runs" of its specimen were before one: with less than two there are no terms by them.
         runs: that are fitted, counted from 0.
     """
-    found = [*_of_the_strip(ranges), *_of_the_camera(ranges)]
+    found = [*_of_the_strip(ranges), *_of_the_camera(ranges), *_by_run(ranges)]
     return [*(_with_ranges(term, ranges) for term in found), *_of_the_run(runs)]
 
 
@@ -318,6 +323,56 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         for shape in _splines(name, SPLINES[:1])
     ]
     yield _term(name, "heights, or their scale, by the overhang", "reading", ("length",), forms)
+
+
+def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
+    """What handling does to a strip from one run to the next."""
+    last, bend = ranges.get("runs", 0.0), ranges["curvature"]
+    if last < FEWEST_BEFORE:
+        return
+    name = "bending_moment_of_run"
+    forms = [
+        StripVariant(
+            label,
+            parameters,
+            shape=Shape("runs_before", "log_flexibility", last, g),
+            added_moment=partial(_softened, g, last),
+        )
+        for label, parameters, g in _over_runs(name)
+    ]
+    about = "bending stiffness that changes from run to run of a specimen"
+    yield _term(name, about, "bending_moment", ("run",), forms)
+    name = "rest_curvature_of_run"
+    forms = [
+        StripVariant(
+            label,
+            parameters,
+            shape=Shape("runs_before", Y["rest_curvature"], last, partial(_times, bend, g)),
+            added_curvature=partial(_set_by_then, g, last, bend),
+        )
+        for label, parameters, g in _over_runs(name, constant=True)
+    ]
+    about = "curvature of the unloaded strip that changes from run to run of a specimen"
+    yield _term(name, about, "rest_curvature", ("run",), forms)
+
+
+def _over_runs(name: str, *, constant: bool = False) -> Iterator[Drawn]:
+    yield from _splines(name, SPLINES, constant=constant)
+    zero = (_coefficient(f"{name}_0"),) if constant else ()
+    one, width = _coefficient(f"{name}_1"), Parameter(f"{name}_width", FADING, 0.1, 2.0)
+
+    def saturating(p: Values, x: Any) -> Any:
+        return sum(p[c.name] for c in zero) + p[one.name] * (1 - exp(-x / p[width.name]))
+
+    yield "saturation", (*zero, one, width), saturating
+
+
+def _softened(g: Of, last: float, p: Values, at: Values) -> Any:
+    return p["B"] * at["kappa"] * (exp(-g(p, min_value(at["run"] / last, 1))) - 1)
+
+
+def _set_by_then(g: Of, last: float, bend: float, p: Values, at: Values) -> Any:
+    return bend * g(p, min_value(at["run"] / last, 1))
 
 
 def _of_the_run(runs: Sequence[int]) -> Iterator[Effect]:

@@ -18,7 +18,8 @@ class StripVariant(Variant):
     """An effect in a cantilever, as expressions in UFL of its parameters.
 
     What varies along the strip is also a function of what is known at a place: the arc length
-    ``s`` from the clamp and the ``length`` of the overhang [mm].
+    ``s`` from the clamp and the ``length`` of the overhang [mm], and how many runs of the specimen
+    were before, ``run``, where there are three or more (else 0).
 
     Attributes:
         laws: bending moments per width (mechanics.bending_laws) added to B κ.
