@@ -172,7 +172,7 @@ def test_an_impossible_drape_stops(case, tmp_path, ranks):
     assert "signal" not in process.stderr
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_resume_ends_in_the_same_state(case, completed, tmp_path, ranks):
     arguments = ("run", case, "--out", tmp_path, "--no-pictures")
     process = command(*arguments, code=INTERRUPTED, ranks=ranks)

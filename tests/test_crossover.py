@@ -252,6 +252,7 @@ def on_that_many(ranks):
     return json.loads(done.stdout.splitlines()[-1])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not MPIRUN.exists(), reason="needs /usr/bin/mpirun")
 def test_up_to_four_ranks_find_the_same():
     found = [on_that_many(ranks) for ranks in (1, 2, 3, 4)]

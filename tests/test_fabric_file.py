@@ -328,6 +328,7 @@ def test_uncertainty_of_a_linear_frame(tmp_path):
     assert again["fabric"] is None and again["crossover"]["k3_N_mm"] == 0.06
 
 
+@pytest.mark.slow
 def test_a_drape_says_how_uncertain_it_is(tmp_path, capsys):
     """One spring with an error: each angle's is its change in a case that has the other spring."""
     keys = {"crossover.k1_N_mm": 1.0}
@@ -451,6 +452,7 @@ def test_a_term_is_in_a_net_what_it_is_in_the_loop(term, tmp_path):
     assert_the_net_is_the_loops(tmp_path, measurement, (variant,), values, crossover=crossover)
 
 
+@pytest.mark.slow
 def test_readings_on_one_curve_are_a_table(tmp_path):
     """Monotone at one rate: m = 0.02 γ + 2 γ⁵, which no spring of the baseline is."""
     out = tmp_path / "found"

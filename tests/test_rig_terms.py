@@ -222,6 +222,21 @@ def test_a_specimen_remembers_its_earlier_runs(tmp_path):
     assert same == pytest.approx(found.expected, abs=1e-9)
 
 
+def test_terms_over_two_variables_remember_earlier_runs_as_well(tmp_path):
+    """Each form there is of a largest angle or a path, where a specimen had several runs."""
+
+    def ways(runs):
+        products = [
+            t for t in write(tmp_path / str(len(runs)), creeping_cell, runs).terms if t.of_two
+        ]
+        assert products
+        return [v.carried for t in products for v in t.variants if "run" not in t.depends_on]
+
+    assert set(ways({"a": PROGRAMME})) == {""}
+    several = ways(RUNS)
+    assert {*several} == {"", "path", "largest_angle"}
+
+
 def test_two_runs_have_no_term_by_the_run(tmp_path):
     """What two runs differ by is a line whatever it is."""
     few = {"a": PROGRAMME, "b": PROGRAMME[::-1][1:]}

@@ -219,7 +219,7 @@ class CrossheadTest:
             else:
                 found = self._recorded.added(variant, "variable", whole, values)
             return self._recorded.at_readings(found.value)
-        key = (variant, "along")
+        key = (variant.like or variant, "along")
         if key not in self._compiled:
             names = tuple(p.name for p in variant.parameters) + variant.of_baseline
             marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
@@ -352,7 +352,7 @@ class CrossheadTest:
         self, variant: FrameVariant | None, known: dict[str, Varying], values: Mapping[str, float]
     ) -> Varying:
         """Moment per area [N] of the baseline or of an effect."""
-        key = (variant, "moment")
+        key = ((variant.like or variant) if variant is not None else None, "moment")
         if key not in self._compiled:
             parameters = self.baseline if variant is None else variant.parameters
             names = tuple(p.name for p in parameters)

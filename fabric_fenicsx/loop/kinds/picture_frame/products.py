@@ -15,7 +15,7 @@ from typing import Any
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import product_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .shapes import FORGETFUL, X, Y, fitted, shapes
+from .shapes import FORGETFUL, X, Y, fitted, remembered_since, shapes
 from .terms import as_reported, of_a_law, ranges_of, remembering
 from .variant import FrameVariant
 
@@ -95,7 +95,7 @@ def _forms(
 ) -> Iterator[FrameVariant]:
     for powers in kind.powers:
         fixed: dict[str, Any] = {"base": kind.base, "variable": variable}
-        fixed |= {"reach": largest[variable], "also": kind.also, "powers": powers}
+        fixed |= {"also": kind.also, "powers": powers}
         fixed["also_reach"] = largest[kind.also]
         fixed |= remembering(name, kind.base, variable, largest)
         if kind.constants:
@@ -105,8 +105,15 @@ def _forms(
                 for p in powers
             ]
             fixed["constants"] = tuple(own)
+        said = ", ".join(map(str, powers))
         for label, numbers in _shapes(name, kind, variable, powers):
-            yield _form(f"{label}, powers {', '.join(map(str, powers))}", fixed | numbers)
+            first: FrameVariant | None = None
+            for carried, reach, words in remembered_since(variable, largest):
+                every = fixed | numbers | {"reach": reach}
+                like = first if reach == largest[variable] else None
+                form = _form(f"{words}, {label}, powers {said}", every, carried, like)
+                first = first or form
+                yield form
 
 
 def _shapes(
@@ -122,10 +129,10 @@ def _shapes(
             for p in powers
             for k in range(len(one))
         )
-        yield f"{variable.replace('_', ' ')}, {label}", numbers | {"coefficients": coefficients}
+        yield label, numbers | {"coefficients": coefficients}
 
 
-def _form(label: str, own: dict[str, Any]) -> FrameVariant:
+def _form(label: str, own: dict[str, Any], carried: str, like: FrameVariant | None) -> FrameVariant:
     shape = Shape(
         X[own["variable"]],
         Y.get(own["base"], "moment_N"),
@@ -135,7 +142,8 @@ def _form(label: str, own: dict[str, Any]) -> FrameVariant:
         also=X[own["also"]],
         also_reach=own["also_reach"],
     )
-    return FrameVariant(label, fitted(own), shape=shape, laws=partial(of_a_law, own))
+    laws = partial(of_a_law, own)
+    return FrameVariant(label, fitted(own), shape=shape, laws=laws, carried=carried, like=like)
 
 
 def _factor(numbers: Mapping[str, Any], values: Values, x: Any, w: Any) -> Any:

@@ -18,6 +18,7 @@ __all__ = [
     "fitted",
     "memory_of",
     "over_runs",
+    "remembered_since",
     "shapes",
     "wealth",
 ]
@@ -37,6 +38,9 @@ MEMORIES = (0.01, 0.05, 0.2)
 
 FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate")
 """Variables of a fading memory."""
+
+CARRIED = {"largest_angle": "largest_angle", "relative_angle": "largest_angle", "path": "path"}
+"""What variables have from earlier runs of a specimen; see FrameVariant.carried."""
 
 Ends = Mapping[str, tuple[float, float]]
 """Between which shares of their largest sizes variables were, by their names."""
@@ -95,6 +99,20 @@ def memory_of(name: str, largest: Mapping[str, float], *shares: float) -> Parame
     full = largest["time"]
     starts = tuple(share * full for share in shares or MEMORIES)
     return Parameter(f"{name}_memory_s", starts, starts[0] / 10.0, full)
+
+
+def remembered_since(
+    variable: str, largest: Mapping[str, float]
+) -> Iterator[tuple[str, float, str]]:
+    """Since when a variable remembers: what it has from earlier runs, its reach, and in words.
+
+    Since a run began and, where a specimen had several, also since its first one.
+    """
+    words = variable.replace("_", " ")
+    yield "", largest[variable], words
+    if variable in CARRIED and "path_of_specimen" in largest:
+        reach = largest["path_of_specimen" if variable == "path" else variable]
+        yield CARRIED[variable], reach, f"{words} of all runs"
 
 
 def wealth(base: str, variable: str) -> int:

@@ -20,15 +20,25 @@ from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ShapedLaw
 from ....mechanics.laws.springs import PolynomialSpring
 from ...inference.effects import Effect, Shape, Values, valued
 from .rig_terms import rig_terms
-from .shapes import FORGETFUL, Ends, X, Y, factor, fitted, memory_of, over_runs, shapes, wealth
+from .shapes import (
+    FORGETFUL,
+    Ends,
+    X,
+    Y,
+    factor,
+    fitted,
+    memory_of,
+    over_runs,
+    remembered_since,
+    shapes,
+    wealth,
+)
 from .variant import FrameVariant
 
 __all__ = ["as_reported", "of_a_law", "of_the_run", "ranges_of", "remembering", "terms"]
 
 #: Angles in which a friction begins to slide [rad].
 STICKS = (0.005, 0.03)
-#: Memories that may go on from one run of a specimen to the next.
-CARRIED = ("largest_angle", "path")
 #: Runs before another that a term by the run needs: what two runs differ by is anything.
 FEWEST_BEFORE = 2
 
@@ -78,9 +88,6 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             name = f"{base}_moment_of_{by}"
             alike = ("dissipative", "smooth") if base == "dissipative" else (base,)
             forms = [f for b in alike for v in own for f in _laws(name, b, v, largest)]
-            if "path_of_specimen" in largest:
-                kept = [v for v in own if v in CARRIED]
-                forms += [f for b in alike for v in kept for f in _laws(name, b, v, largest, True)]
             depends_on, words = (by, *also.get(base, ())), base.replace("_", " ")
             yield Effect(
                 name,
@@ -193,26 +200,31 @@ def remembering(
 
 
 def _laws(
-    name: str, base: str, variable: str, largest: Mapping[str, float], carried: bool = False
+    name: str, base: str, variable: str, largest: Mapping[str, float]
 ) -> Iterator[FrameVariant]:
-    """Forms of a factor of a moment; carried, its memory goes on in a specimen's next run."""
-    reach = largest["path_of_specimen" if carried and variable == "path" else variable]
-    fixed: dict[str, Any] = {"base": base, "variable": variable, "reach": reach}
+    """Forms of a factor of a moment."""
+    fixed: dict[str, Any] = {"base": base, "variable": variable}
     fixed |= remembering(name, base, variable, largest)
     if base in FRICTION:
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
     of_baseline = ("k1_N", "k3_N") if base in OF_ELASTIC else ()
+    smooth = ", smooth" if base == "smooth" else ""
     for label, coefficients, numbers in shapes(name, wealth(base, variable)):
-        own = fixed | numbers | {"coefficients": coefficients}
-        yield FrameVariant(
-            f"{variable.replace('_', ' ')}{' of all runs' if carried else ''}, {label}"
-            + (", smooth" if base == "smooth" else ""),
-            fitted(own),
-            shape=Shape(X[variable], Y.get(base, "moment_N"), reach, partial(factor, own), own),
-            laws=partial(of_a_law, own),
-            carried=variable if carried else "",
-            of_baseline=of_baseline,
-        )
+        first: FrameVariant | None = None
+        for carried, reach, words in remembered_since(variable, largest):
+            own = fixed | numbers | {"reach": reach, "coefficients": coefficients}
+            value = partial(factor, own)
+            form = FrameVariant(
+                f"{words}, {label}{smooth}",
+                fitted(own),
+                shape=Shape(X[variable], Y.get(base, "moment_N"), reach, value, own),
+                laws=partial(of_a_law, own),
+                carried=carried,
+                like=first if reach == largest[variable] else None,
+                of_baseline=of_baseline,
+            )
+            first = first or form
+            yield form
 
 
 def of_a_law(numbers: Mapping[str, Any], values: Values) -> tuple[ShapedLaw, ...]:

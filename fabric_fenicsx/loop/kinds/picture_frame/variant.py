@@ -36,6 +36,7 @@ class FrameVariant(Variant):
         variable: what a term without a formula depends on, from these; by default the first.
         carried: what ``laws`` remember as "variable" from earlier runs of a specimen, "path" or
             "largest_angle"; empty where each run begins anew.
+        like: a form whose laws have the same expressions, which serve both.
         of_baseline: parameters of the baseline that ``laws`` needs as well.
         each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
             has. Those of a holdout run can only come from that run: its error is then what is
@@ -53,6 +54,7 @@ class FrameVariant(Variant):
     remembered: Callable[[Values, Values, Any], Any] | None = None
     variable: Callable[[Values], Any] | None = None
     carried: str = ""
+    like: FrameVariant | None = None
     of_baseline: tuple[str, ...] = ()
     each_run: bool = False
 
