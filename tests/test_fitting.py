@@ -169,6 +169,7 @@ def test_every_form_is_fitted_from_its_best_start():
     assert found.final.values["locking_angle_rad"] == pytest.approx(angle, rel=0.02)
 
 
+@pytest.mark.slow
 def test_two_rates_do_not_tell_a_power_from_friction():
     """Either fits two rates of one specimen; that one foretells the third is not looked at.
 

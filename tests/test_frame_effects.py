@@ -84,6 +84,7 @@ def test_play_is_found_by_what_happens_at_the_turns(form, behind, ahead):
     assert not found.outliers.any()
 
 
+@pytest.mark.slow
 def test_outliers_are_left_out_beside_play():
     spoil = (37, 112)
     found = diagnosed(follow=lambda D: followed(D, 1.0, 0.0), spoil=spoil)

@@ -133,6 +133,7 @@ def test_what_is_there_is_kept(tmp_path, capsys):
     assert [path.name for path in tmp_path.iterdir()] == ["mine.csv"]
 
 
+@pytest.mark.slow
 def test_a_hidden_turn_of_a_clamp_is_found(tmp_path):
     made, out = tmp_path / "made", tmp_path / "report"
     hidden = "clamp_tilt:tilt_rad=0.03"

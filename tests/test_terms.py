@@ -499,6 +499,7 @@ def test_two_terms_of_the_travel_add(tmp_path):
         np.testing.assert_allclose(together[name], alone, atol=1e-5 * np.abs(alone).max())
 
 
+@pytest.mark.slow
 def test_one_term_spares_the_fits_of_several_listed_effects(tmp_path):
     """Which to first order leave far more than noise: none is tried in a model with another."""
     done = []
