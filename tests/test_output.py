@@ -18,10 +18,12 @@ from matplotlib.colors import to_rgb
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import WARP, WEFT, Net, single_tow
 from fabric_fenicsx.output import files
+from fabric_fenicsx.output.canvas import canvas
 from fabric_fenicsx.output.colours import colour_table, rgb
 from fabric_fenicsx.output.lines import COLOURS, arc_length
 from fabric_fenicsx.output.paraview import TimeSeries
 from fabric_fenicsx.output.pictures import VIEWS, _stations, aim, draw_net
+from fabric_fenicsx.output.polydata import poly_data
 from fabric_fenicsx.output.surfaces import RevolvedSurface, triangles
 from fabric_fenicsx.output.vtk_xml import packed, xml_file
 from fabric_fenicsx.solving.snapshot import Snapshot, at_rest
@@ -435,3 +437,16 @@ def test_files_without_vtk_are_those_that_vtk_reads(tmp_path: Path, count: int):
     assert np.array_equal(mesh.points, points) and np.array_equal(mesh.point_data[name], points)
     assert np.array_equal(mesh.faces.reshape(-1, 4)[:, 1:].ravel(), corners)
     assert mesh.field_data["when"] == [1.5]
+
+
+def test_edges_of_a_picture_are_smooth(tmp_path):
+    """A slanted edge between black and white has greys: pixels are means of several."""
+    from PIL import Image
+
+    with canvas(tmp_path / "edge.png", (200, 200), ()) as scene:
+        corners = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.6, 0.0]])
+        scene.add(poly_data(corners, faces=np.array([[0, 1, 2]])), "#000000", ambient=1.0)
+        scene.look(np.zeros(3), np.array([0.0, 0.0, 5.0]), np.array([0.0, 1.0, 0.0]), 30.0, 1.5)
+    grey = np.asarray(Image.open(tmp_path / "edge.png").convert("L"))
+    assert grey.shape == (200, 200) and grey.min() == 0 and grey.max() == 255
+    assert np.count_nonzero((grey > 30) & (grey < 225)) > 50

@@ -39,7 +39,7 @@ __all__ = ["Canvas", "canvas"]
 
 Array = npt.NDArray[np.float64]
 
-FINER = 1
+FINER = 2
 """Pixels of the scene for one of the picture, in either direction."""
 
 UNSEEN = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
