@@ -14,10 +14,20 @@ from ..expressions.marching import Marched, Varying
 from ..inference.experiment import Readings
 from .picture_frame.motion import Motion
 
-__all__ = ["laid_out", "of_a_crossing", "runs_before", "shifted", "typical"]
+__all__ = [
+    "FEWEST_BEFORE",
+    "earlier_alike",
+    "laid_out",
+    "of_a_crossing",
+    "runs_before",
+    "shifted",
+    "typical",
+]
 
 Array = npt.NDArray[np.float64]
 
+#: Runs before another that a term by the run needs: what two runs differ by is anything.
+FEWEST_BEFORE = 2
 #: Time step [s] to the first point of a record.
 BEFORE = 1e-9
 
@@ -57,11 +67,14 @@ def laid_out(
 def runs_before(readings: Readings) -> dict[str, Array]:
     """How many runs were before each, in its "folder" and of its "specimen", (n_runs,) each."""
     first = np.unique(readings.run, return_index=True)[1]
-    found = {}
-    for name, numbers in (("folder", readings.folder), ("specimen", readings.specimen)):
-        own = numbers[first]
-        found[name] = np.array([np.sum(own[:k] == own[k]) for k in range(len(own))], dtype=float)
-    return found
+    numbers = {"folder": readings.folder[first], "specimen": readings.specimen[first]}
+    return {name: np.array(earlier_alike(own), dtype=float) for name, own in numbers.items()}
+
+
+def earlier_alike(numbers: Sequence[int] | npt.NDArray[np.int64]) -> list[int]:
+    """How many of those before each are the same."""
+    listed = list(numbers)
+    return [listed[:k].count(own) for k, own in enumerate(listed)]
 
 
 def typical(rate: Array) -> float:

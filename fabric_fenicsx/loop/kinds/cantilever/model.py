@@ -30,10 +30,11 @@ from ...inference.effects import Effect, Parameter, Variant, of_each_run, scaled
 from ...inference.experiment import NO_DEVIATIONS, Deviations, Law
 from ...measurement.readings import common_noise, readings_of, specimens_of
 from ...measurement.schema import Measurement
+from ..records import FEWEST_BEFORE, earlier_alike
 from .effects import CANTILEVER_EFFECTS
 from .hanging import HangingTow, Laws, Shape, sum_of
 from .measured_line import scatter_of_x, smooth_line
-from .terms import FEWEST_BEFORE, terms
+from .terms import terms
 from .variant import StripVariant
 
 __all__ = ["Cantilever"]
@@ -201,7 +202,9 @@ class Cantilever:
         number = 0
         # Runs that nothing can be told by share their strips.
         many = {s for s in specimens if list(specimens).count(s) > FEWEST_BEFORE}
-        self._before: list[int] = []
+        self._before = [
+            n if s in many else 0 for n, s in zip(earlier_alike(specimens), specimens, strict=True)
+        ]
         for m in measurements:
             tow, spacing = m.fabric.tow, m.fabric.tow_spacing_mm
             # kg/m² is 1e-9 tonne/mm².
@@ -213,8 +216,6 @@ class Cantilever:
                 columns = [c[n][order] for n in ("length_mm", "s_mm", "x_mm", "z_mm")]
                 table.append(np.stack(columns))
                 run_of.append(np.full(run.count, number, dtype=np.int64))
-                earlier = int(np.sum(np.asarray(specimens[:number]) == specimens[number]))
-                self._before.append(earlier if specimens[number] in many else 0)
                 for length in columns[0]:
                     size = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
                     key = (*size, self._before[number], m.rig.upside_down)

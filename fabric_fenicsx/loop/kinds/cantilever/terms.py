@@ -28,9 +28,10 @@ from ....mechanics.bending_laws import TabulatedBending
 from ....mechanics.laws.shaped import shape_of
 from ....mechanics.scalars import numpy_function, symbol
 from ...inference.effects import Effect, Shape, Values, of_run
+from ..records import FEWEST_BEFORE
 from .variant import StripVariant
 
-__all__ = ["FEWEST_BEFORE", "strip_term", "terms"]
+__all__ = ["strip_term", "terms"]
 
 #: Numbers of coefficients of a spline.
 SPLINES = (1, 2)
@@ -40,8 +41,6 @@ STEPS, BUMPS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 WIDTH, BUMP_WIDTHS = 0.03, (0.03, 0.1)
 #: Decays from the clamp or from the free end, as shares of it.
 DECAYS = (0.05, 0.2)
-#: Runs before another that a term by the run needs: what two runs differ by is anything.
-FEWEST_BEFORE = 2
 #: Over how many runs something settles, as a share of them.
 FADING = (0.3, 1.0)
 #: Where flexibility is as without a term: about the middle of where strips bend, so that B is
@@ -201,7 +200,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
                 parameters,
                 Shape("length_mm", Y[acts_on], longest, partial(_times, unit, g)),
                 to,
-                partial(_of_length, unit, g, longest),
+                partial(_of_strip, unit, g, "length", longest),
             )
             for label, parameters, g in _splines(name, SPLINES[:1], constant=constant)
         ]
@@ -245,13 +244,17 @@ def _along(end: str, longest: float, at: Values) -> Any:
 
 
 def _flexible(g: Of, end: str, longest: float, p: Values, at: Values) -> Any:
-    more = _centred(g, end, p, _along(end, longest, at))
-    return p["B"] * at["kappa"] * (exp(-more) - 1)
+    return _softer(_centred(g, end, p, _along(end, longest, at)), p, at)
 
 
 def _odd(g: Of, half: str, p: Values, at: Values) -> Any:
     size = abs(at["kappa"])
-    return p["B"] * at["kappa"] * (exp(-g(p, size / (size + p[half]))) - 1)
+    return _softer(g(p, size / (size + p[half])), p, at)
+
+
+def _softer(log_flexibility: Any, p: Values, at: Values) -> Any:
+    """What a moment changes by where a strip is more flexible."""
+    return p["B"] * at["kappa"] * (exp(-log_flexibility) - 1)
 
 
 def _tabulated(
@@ -271,8 +274,9 @@ def _of_place(unit: float, g: Of, end: str, longest: float, p: Values, at: Value
     return unit * g(p, _along(end, longest, at))
 
 
-def _of_length(unit: float, g: Of, longest: float, p: Values, at: Values) -> Any:
-    return unit * g(p, min_value(at["length"] / longest, 1))
+def _of_strip(unit: float, g: Of, by: str, most: float, p: Values, at: Values) -> Any:
+    """Of what is the same all along a strip, its "length" or its "run"."""
+    return unit * g(p, min_value(at[by] / most, 1))
 
 
 # Camera ---------------------------------------------------------------------------------------
@@ -348,7 +352,7 @@ def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
             label,
             parameters,
             shape=Shape("runs_before", Y["rest_curvature"], last, partial(_times, bend, g)),
-            added_curvature=partial(_set_by_then, g, last, bend),
+            added_curvature=partial(_of_strip, bend, g, "run", last),
         )
         for label, parameters, g in _over_runs(name, constant=True)
     ]
@@ -368,11 +372,7 @@ def _over_runs(name: str, *, constant: bool = False) -> Iterator[Drawn]:
 
 
 def _softened(g: Of, last: float, p: Values, at: Values) -> Any:
-    return p["B"] * at["kappa"] * (exp(-g(p, min_value(at["run"] / last, 1))) - 1)
-
-
-def _set_by_then(g: Of, last: float, bend: float, p: Values, at: Values) -> Any:
-    return bend * g(p, min_value(at["run"] / last, 1))
+    return _softer(_of_strip(1.0, g, "run", last, p, at), p, at)
 
 
 def _of_the_run(runs: Sequence[int]) -> Iterator[Effect]:

@@ -81,8 +81,7 @@ class PictureFrame(CrossheadTest):
         fitted = np.unique(self.readings.run[self.readings.fit])
         ranges |= {f"run_of_{name}": max(n[fitted]) for name, n in self._before.items()}
         if ranges["run_of_specimen"]:
-            along = np.abs(np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0))
-            whole = self._past_of_specimens["path"] + along.sum(axis=0)
+            whole = self._past_of_specimens["path"] + self._paths
             ranges["path_of_specimen"] = float(whole[fitted].max())
         return [*terms(ranges, self._ends()), *products(ranges)]
 
@@ -100,9 +99,10 @@ class PictureFrame(CrossheadTest):
     def shear(self) -> tuple[Array, Array]:
         """Angle [rad] and force over moment per area [mm] at every reading, (n,) each."""
         known = self._kinematics(self._points, {})
-        return self._recorded.at_readings(known["gamma"].value), self._recorded.at_readings(
-            known["factor"].value
+        gamma, factor = (
+            self._recorded.at_readings(known[name].value) for name in ("gamma", "factor")
         )
+        return gamma, factor
 
     def _steady(self, rows: npt.NDArray[np.bool_]) -> bool:
         """Whether some readings are of one way at one speed of the crosshead or of the angle."""
@@ -121,6 +121,12 @@ class PictureFrame(CrossheadTest):
         return {f"0 {name}": known[of] for name, of in named.items()}
 
     @cached_property
+    def _paths(self) -> Array:
+        """Path of each run [rad], (n_runs,)."""
+        gamma = self._kinematics(self._points, {})["gamma"].value
+        return np.asarray(np.abs(np.diff(gamma, axis=0)).sum(axis=0))
+
+    @cached_property
     def _past_of_specimens(self) -> dict[str, Array]:
         """What a specimen went through in earlier runs, (n_runs,) each.
 
@@ -128,7 +134,7 @@ class PictureFrame(CrossheadTest):
         """
         readings = self.readings
         gamma = self._kinematics(self._points, {})["gamma"].value
-        paths = np.abs(np.diff(gamma, axis=0)).sum(axis=0)
+        paths = self._paths
         peaks = gamma[np.abs(gamma).argmax(axis=0), np.arange(gamma.shape[1])]
         specimen = readings.specimen[np.unique(readings.run, return_index=True)[1]]
         path, peak = np.zeros_like(paths), np.zeros_like(paths)

@@ -19,6 +19,7 @@ from ....mechanics.laws.law import CrossingLaw
 from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ShapedLaw
 from ....mechanics.laws.springs import PolynomialSpring
 from ...inference.effects import Effect, Shape, Values, valued
+from ..records import FEWEST_BEFORE
 from .rig_terms import rig_terms
 from .shapes import (
     FORGETFUL,
@@ -39,8 +40,6 @@ __all__ = ["as_reported", "of_a_law", "of_the_run", "ranges_of", "remembering", 
 
 #: Angles in which a friction begins to slide [rad].
 STICKS = (0.005, 0.03)
-#: Runs before another that a term by the run needs: what two runs differ by is anything.
-FEWEST_BEFORE = 2
 
 
 def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> list[Effect]:
