@@ -110,6 +110,31 @@ def test_a_fit_that_ends_at_its_cap_has_not_converged():
     assert done.converged and done.values["a"] == pytest.approx(5.0, rel=1e-6)
 
 
+class WithAnEnd(Linear):
+    """√(1 - a) t, which is a number at a = 1 and has no slope there; without noise."""
+
+    def __init__(self):
+        line = a_line(0)
+        t = line.columns["b"]
+        super().__init__(replace(line.readings, observed=0.5 * t), {"a": t}, ("a",))
+        self.ends = 0
+
+    def predict(self, variants, values, deviations=NO_DEVIATIONS):
+        t, root = self.columns["a"], np.sqrt(max(1.0 - values["a"], 0.0))
+        self.ends += root == 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return root * t, {"a": -0.5 * t / root}
+
+
+def test_a_fit_turns_back_where_a_model_has_no_slope():
+    line = WithAnEnd()
+    # The first step goes beyond the end.
+    found = fit(line, (), {"a": -8.0}, line.readings.fit, UNIT)
+    assert line.ends and found.values["a"] == pytest.approx(0.75, rel=1e-6)
+    with pytest.raises(SolveError, match="not a number"):
+        fit(line, (), {"a": 1.0}, line.readings.fit, UNIT)
+
+
 def test_parts_that_cannot_be_predicted_are_counted():
     class Failing(Linear):
         starting = False

@@ -374,7 +374,10 @@ class _Model:
                 for name in self._groups[group]
             }
             found = self._experiment.predict(self._variants, values, deviations)
-            if not np.isfinite(found[0][self._used]).all():
+            # Where an angle is at the end of its range the force is a number, its slope is none.
+            if not all(
+                np.isfinite(one[self._used]).all() for one in (found[0], *found[1].values())
+            ):
                 raise SolveError("the model is not a number at these parameters")
             self._cache[key] = found
         return self._cache[key]
