@@ -89,6 +89,15 @@ def test_what_the_data_do_not_tell_is_not_certain():
     assert lost.predictive_rms(out) == pytest.approx(np.std(model.residual[out]), rel=1e-6)
 
 
+def test_what_is_no_number_is_not_foreseen():
+    line, model = fitted(3)
+    out = line.readings.holdout
+    for lost in (np.nan, np.inf):
+        beyond = replace(model, slopes=np.where(out[:, None], lost, model.slopes))
+        assert beyond.predictive_rms(out) == np.inf
+        assert beyond.predictive_rms(line.readings.fit) == model.predictive_rms(line.readings.fit)
+
+
 class Exponential(Linear):
     """exp(-a t), which a fit does not reach in two evaluations; without noise."""
 

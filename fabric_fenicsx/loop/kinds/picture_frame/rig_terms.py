@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -70,6 +70,7 @@ RIG_VARIABLES = {
         partial(_itself, "memory"),
         lambda at, past, memory: max_value(past, size_of(at["force"])),
     ),
+    "force_size": RigVariable(("force",), lambda at: size_of(at["force"])),
     "force_lag": RigVariable(
         ("force", "per_time"), partial(_lag, "force"), partial(_mean, "force")
     ),
@@ -106,6 +107,9 @@ RIG: dict[str, dict[str, tuple[str, ...]]] = {
 AGAINST_THE_MOTION = ("displacement", "force")
 """What a friction of the rig may depend on; the load cell reads it with the sign of the speed."""
 
+GAINS = ("time", "displacement", "run")
+"""What a load cell's gain may change with, beside the force."""
+
 LINES = ("force_rate", "acceleration", "force_lag", "displacement_lag")
 """Variables of which a term is a multiple."""
 
@@ -122,17 +126,26 @@ def rig_terms(largest: Mapping[str, float], ends: Ends) -> Iterator[Effect]:
             if variable not in largest:
                 continue
             name = f"{acts_on}_of_{variable}"
-            forms = _forms(acts_on, name, variable, largest, ends)
+            forms = [*_forms(acts_on, name, variable, largest, ends)]
+            if name == "reading_of_force":
+                forms += _forms(acts_on, name, "force_size", largest, ends, gain=True)
             yield _term(acts_on, name, reported, forms)
     for variable in AGAINST_THE_MOTION:
         name = f"reading_of_{variable}_and_direction"
         ways: tuple[Turning, ...] = ("kept in a hold", "at its rate")
         both = (f for way in ways for f in _forms("reading", name, variable, largest, ends, way))
         yield _term("reading", name, (variable, "rate"), both)
+    for variable in GAINS:
+        if variable in largest:
+            name = f"reading_of_force_and_{variable}"
+            gains = _forms("reading", name, variable, largest, ends, gain=True)
+            term = _term("reading", name, ("force", variable), gains)
+            # By the displacement it is near to a moment by the angle.
+            yield replace(term, of_two=variable == "displacement")
 
 
 def _term(
-    acts_on: str, name: str, depends_on: tuple[str, ...], forms: Iterator[FrameVariant]
+    acts_on: str, name: str, depends_on: tuple[str, ...], forms: Iterable[FrameVariant]
 ) -> Effect:
     about = f"what acts on the {acts_on}, by {' and '.join(depends_on)}"
     return Effect(
@@ -153,12 +166,13 @@ def _forms(
     largest: Mapping[str, float],
     ends: Ends,
     turning: Turning = "",
+    gain: bool = False,
 ) -> Iterator[FrameVariant]:
     """Forms of what is added."""
-    reach = largest[variable]
+    reach = largest[variable.removesuffix("_size")]
     between = ends.get(variable.removeprefix("recent_"), (0.0, 1.0))
-    shapes_of = list(_added(name, variable, turning))
-    if between[0] < 0.0 < between[1] and variable not in LINES:
+    shapes_of = list(_gains(name, variable) if gain else _added(name, variable, turning))
+    if between[0] < 0.0 < between[1] and variable not in LINES and not gain:
         sides = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("odd", "even"))
         shapes_of.append(
             ("each side its own", {"shape": "sides", "coefficients": sides} | _zero(name, turning))
@@ -172,6 +186,9 @@ def _forms(
             also["memory"] = memory_of(name, largest, *shares)
         if turning:
             also |= {"turning": turning, "slow": SLOW * largest["speed"]}
+        if gain:
+            label, also["gain"] = f"gain, {label}", True
+        y = "share_of_reading" if gain else Y[acts_on]
         yield of_the_rig(
             label if turning != "kept in a hold" else f"{label}, {turning}",
             fitted(own | also),
@@ -181,7 +198,8 @@ def _forms(
             memory=also.get("memory", 0.0),
             turning=turning,
             slow=also.get("slow", 0.0),
-            shape=Shape(X[variable], Y[acts_on], reach, partial(factor, own), own | also, between),
+            gain=gain,
+            shape=Shape(X[variable], y, reach, partial(factor, own), own | also, between),
         )
 
 
@@ -200,6 +218,7 @@ def of_the_rig(
     memory: Any = 0.0,
     turning: Turning = "",
     slow: float = 0.0,
+    gain: bool = False,
     shape: Shape | None = None,
 ) -> FrameVariant:
     """A form of something that acts on the rig.
@@ -214,6 +233,7 @@ def of_the_rig(
         turning: whether that is times the sign of the speed; "kept in a hold" is as it was before,
             as of a friction that sticks, "at its rate" nothing.
         slow: speed below which its sign is rounded, or it holds [mm/s].
+        gain: whether it is a share of the force that is added.
         shape: of a term without a formula.
     """
     kind = RIG_VARIABLES[variable]
@@ -228,6 +248,8 @@ def of_the_rig(
 
     def whole(p: Values, at: Values) -> Any:
         size = added(p, kind.value(at))
+        if gain:
+            return at["force"] * size
         if turning == "kept in a hold":
             return size * at["memory"]
         return size * shape_of("sign", (1.0,), at["speed"], width=slow) if turning else size
@@ -236,12 +258,26 @@ def of_the_rig(
         label,
         parameters,
         shape=shape,
-        of=(*kind.of, "speed") if turning else kind.of,
+        of=tuple(dict.fromkeys((*kind.of, *["force"] * gain, *["speed"] * bool(turning)))),
         remembered=remembered,
         variable=kind.value if kind.remembered is not None else None,
         added_reading=whole if acts_on == "reading" else None,
         added_travel=whole if acts_on == "travel" else None,
     )
+
+
+def _gains(name: str, variable: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Label and numbers of a gain's shapes, which change it from what it is at the beginning.
+
+    That of the force is what it is at the largest one: small ones may not be read at all.
+    """
+    of_the_force = variable == "force_size"
+    chosen = ("step", "saturation") if of_the_force else ()
+    own = over_runs(name) if variable == "run" else shapes(name, 3)
+    for label, coefficients, numbers in own:
+        if label in chosen or not chosen:
+            top = {"from_the_top": True} if of_the_force else {}
+            yield label, numbers | {"coefficients": coefficients} | top
 
 
 def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:

@@ -60,6 +60,7 @@ X = {
     "speed": "speed_mm_s",
     "acceleration": "acceleration_mm_s2",
     "force": "force_N",
+    "force_size": "force_size_N",
     "force_rate": "force_rate_N_s",
     "recent_force": "recent_force_N",
     "largest_force": "largest_force_N",
@@ -91,7 +92,8 @@ def factor(numbers: Mapping[str, Any], values: Values, x: Any) -> Any:
     own = {key: valued(n, values) for key, n in numbers.items()}
     shape = own.pop("shape"), own.pop("coefficients")
     at = {key: own[key] for key in ("place", "width", "ends") if key in own}
-    return own.get("constant", 0.0) + shape_of(*shape, x, **at)
+    top = shape_of(*shape, 1.0, **at) if own.get("from_the_top") else 0.0
+    return own.get("constant", 0.0) - top + shape_of(*shape, x, **at)
 
 
 def memory_of(name: str, largest: Mapping[str, float], *shares: float) -> Parameter:
