@@ -27,7 +27,7 @@ Variable = Literal[
     "recent_rate",
 ]
 AtHand = Literal["angle", "rate"]
-Kind = Literal["spline", "graded", "step", "saturation", "logarithm"]
+Kind = Literal["spline", "graded", "step", "saturation", "logarithm", "periodic"]
 Base = Literal[
     "elastic",
     "rest",
@@ -230,7 +230,7 @@ class ShapedLaw(CrossingLaw):
     constant: Any = number("constant", "of the factor where the variable is nothing", float, 0.0)
     shape: Kind = number("shape", "of the factor", Kind, "spline")
     place: Any = number("place", "of a step, as a share of the reach", NotNegative, 0.5)
-    width: Any = number("width", "of a step or a saturation, as a share of it", Positive, 0.1)
+    width: Any = number("width", "of a step, saturation or wave, as a share of it", Positive, 0.1)
     k1: Any = per_area("k1_N_mm", "linear part of the elastic base", NotNegative, 0.0)
     k3: Any = per_area("k3_N_mm", "cubic part of the elastic base", NotNegative, 0.0)
     stick_angle: Any = in_degrees("stick_angle_deg", "of a friction", default=0.5)

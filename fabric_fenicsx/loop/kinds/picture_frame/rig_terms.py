@@ -7,21 +7,19 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
-import numpy as np
 from ufl import conditional, gt, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.law import size_of
 from ....mechanics.laws.shaped import recent, shape_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .shapes import Ends, X, Y, factor, fitted, memory_of, over_runs, shapes, wealth
+from .shapes import Ends, X, Y, factor, fitted, memory_of, over_runs, shapes, wave, wealth
 from .variant import FrameVariant
 
 __all__ = ["RIG_VARIABLES", "RigVariable", "of_the_rig", "rig_terms"]
 
-#: Most cycles over the range that a periodic term is looked for with, and their step: closer
-#: together two waves over the range are alike.
-CYCLES, STEP = {"time": 40.0, "displacement": 16.0}, 0.5
+#: Most cycles over the range that a periodic term is looked for with.
+CYCLES = {"time": 40.0, "displacement": 16.0}
 #: Share of the largest speed below which its sign is rounded.
 SLOW = 1e-3
 #: Memories of what lags, as shares of the longest run: a filter's are short.
@@ -308,10 +306,7 @@ def _added(name: str, variable: str, turning: Turning) -> Iterator[tuple[str, di
     for label, coefficients, numbers in over_runs(name) if variable == "run" else shapes(name, few):
         yield label, numbers | {"coefficients": coefficients} | constant
     if variable in ("time", "displacement") and not turning:
-        waves = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))
-        most = CYCLES[variable]
-        periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
-        period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
+        label, waves, numbers = wave(name, CYCLES[variable])
         # Where a run begins a wave may be anywhere.
         zero = {"constant": Parameter(f"{name}_0", amplitude=True)}
-        yield "periodic", {"shape": "periodic", "coefficients": waves, "width": period} | zero
+        yield label, numbers | {"coefficients": waves} | zero

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import GRADED, shape_of
 from ...inference.effects import Values, valued
@@ -20,6 +22,7 @@ __all__ = [
     "over_runs",
     "remembered_since",
     "shapes",
+    "wave",
     "wealth",
 ]
 
@@ -33,6 +36,8 @@ PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
 DECAYS = (0.1, 0.3)
 #: Where a logarithm bends over, as shares of it.
 BENDS = (0.01, 0.1)
+#: Steps of how many cycles a wave is looked for with: closer together two are alike.
+STEP = 0.5
 #: Memories, as shares of the longest run.
 MEMORIES = (0.01, 0.05, 0.2)
 
@@ -148,6 +153,14 @@ def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...],
         yield "graded", own, {"shape": "graded"}
         bend = Parameter(f"{name}_bend", BENDS, 1e-3, 1.0)
         yield "logarithm", one, {"shape": "logarithm", "width": bend}
+
+
+def wave(name: str, most: float) -> tuple[str, tuple[Parameter, ...], dict[str, Any]]:
+    """A wave: as a shape. With at most so many cycles over the range."""
+    own = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))
+    periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
+    period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
+    return "periodic", own, {"shape": "periodic", "width": period}
 
 
 def over_runs(name: str) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
