@@ -365,6 +365,7 @@ def test_derivatives_of_what_remembers(tmp_path, name):
         ("reading_of_force", "each side its own"),
         ("reading_of_time", "saturation"),
         ("reading_of_force", "gain, step"),
+        ("reading_of_speed", "friction, saturation"),
         ("reading_of_force_and_time", "gain, 2 coefficients"),
         ("reading_of_force_and_run", "gain, linear"),
         ("travel_of_recent_force", "2 coefficients"),

@@ -25,6 +25,8 @@ Variable = Literal[
     "recent_angle",
     "recent_largest_angle",
     "recent_rate",
+    "recent_square_of_angle",
+    "recent_square_of_rate",
 ]
 AtHand = Literal["angle", "rate"]
 Kind = Literal["spline", "graded", "step", "saturation", "logarithm", "periodic"]
@@ -89,6 +91,10 @@ VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
         past * _kept(at.per_time, memory), at.size
     ),
     "recent_rate": lambda at, past, memory: recent(size_of(at.rate), past, at.per_time, memory),
+    "recent_square_of_angle": lambda at, past, memory: recent(
+        at.gamma**2, past, at.per_time, memory
+    ),
+    "recent_square_of_rate": lambda at, past, memory: recent(at.rate**2, past, at.per_time, memory),
 }
 """What a factor may depend on, from the crossing, its value at the step before, and τ [s].
 

@@ -69,6 +69,7 @@ RIG_VARIABLES = {
         lambda at, past, memory: max_value(past, size_of(at["force"])),
     ),
     "force_size": RigVariable(("force",), lambda at: size_of(at["force"])),
+    "speed_size": RigVariable(("speed",), lambda at: size_of(at["speed"])),
     "force_lag": RigVariable(
         ("force", "per_time"), partial(_lag, "force"), partial(_mean, "force")
     ),
@@ -127,6 +128,8 @@ def rig_terms(largest: Mapping[str, float], ends: Ends) -> Iterator[Effect]:
             forms = [*_forms(acts_on, name, variable, largest, ends)]
             if name == "reading_of_force":
                 forms += _forms(acts_on, name, "force_size", largest, ends, gain=True)
+            if name == "reading_of_speed":
+                forms += _forms(acts_on, name, "speed_size", largest, ends, "at its rate")
             yield _term(acts_on, name, reported, forms)
     for variable in AGAINST_THE_MOTION:
         name = f"reading_of_{variable}_and_direction"
@@ -294,6 +297,13 @@ def _zero(name: str, turning: Turning) -> dict[str, Parameter]:
 def _added(name: str, variable: str, turning: Turning) -> Iterator[tuple[str, dict[str, Any]]]:
     """Label and numbers of shapes."""
     one = (Parameter(f"{name}_1", amplitude=True),)
+    if variable == "speed_size":
+        for label, coefficients, numbers in shapes(name, 2):
+            # A friction that falls with the speed, or grows; lines are among the others.
+            if label in ("step", "saturation"):
+                also = {"coefficients": coefficients} | _zero(name, turning)
+                yield f"friction, {label}", numbers | also
+        return
     if variable in LINES:
         yield "linear", {"shape": "spline", "coefficients": one}
         return

@@ -13,6 +13,7 @@ from ...inference.effects import Values, valued
 
 __all__ = [
     "FORGETFUL",
+    "SQUARES",
     "Ends",
     "X",
     "Y",
@@ -41,7 +42,10 @@ STEP = 0.5
 #: Memories, as shares of the longest run.
 MEMORIES = (0.01, 0.05, 0.2)
 
-FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate")
+SQUARES = ("recent_square_of_angle", "recent_square_of_rate")
+"""Of these those that a law is in proportion to, as what heat or a bed takes up is."""
+
+FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate", *SQUARES)
 """Variables of a fading memory."""
 
 CARRIED = {"largest_angle": "largest_angle", "relative_angle": "largest_angle", "path": "path"}
@@ -59,10 +63,13 @@ X = {
     "path": "path_rad",
     "rate": "shear_rate_rad_s",
     "recent_rate": "recent_rate_rad_s",
+    "recent_square_of_angle": "recent_square_of_angle_rad2",
+    "recent_square_of_rate": "recent_square_of_rate_rad2_s2",
     "unloading": "unloading",
     "time": "time_s",
     "displacement": "displacement_mm",
     "speed": "speed_mm_s",
+    "speed_size": "speed_size_mm_s",
     "acceleration": "acceleration_mm_s2",
     "force": "force_N",
     "force_size": "force_size_N",
@@ -124,7 +131,7 @@ def remembered_since(
 
 def wealth(base: str, variable: str) -> int:
     """How many of the splines, which are the more the less else there is to be found."""
-    if variable == "unloading":
+    if variable in ("unloading", *SQUARES):
         return 1
     if (base, variable) in FINE:
         return 5
@@ -144,7 +151,7 @@ def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...],
     if wealth > 1:
         one = (Parameter(f"{name}_1", amplitude=True),)
         place = Parameter(f"{name}_place", PLACES, 0.0, 1.0)
-        width = Parameter(f"{name}_width", WIDTHS, 0.01, 0.5)
+        width = Parameter(f"{name}_width", WIDTHS, 0.002, 0.5)
         yield "step", one, {"shape": "step", "place": place, "width": width}
         decay = Parameter(f"{name}_decay", DECAYS, 0.01, 2.0)
         yield "saturation", one, {"shape": "saturation", "width": decay}
