@@ -82,6 +82,36 @@ def test_slow_noise_is_doubted_sooner_beside_a_name(correlation, beside, alone):
     assert judge.doubtful_noise(replace(slow, effects=())) == bool(alone)
 
 
+def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None):
+    """A line with a bend in it, or a round one: an effect is the bend, a term the round one.
+
+    Args:
+        truth: "bend" or "round".
+        sigmas: its size.
+        more: of how much of the round one, less the bend, the effect has a number of its own.
+        bound: of that number; the truth of a round one is 1.
+        imitated: see Experiment.
+    """
+    t = np.tile(np.linspace(0.0, 1.0, 60), 4)
+    run = np.repeat(np.arange(4), 60)
+    columns = {"a": np.ones_like(t), "b": t, "bend_size": np.maximum(t - 0.5, 0.0)}
+    columns["round_size"] = 0.05 * np.log1p(np.exp((t - 0.5) / 0.05))
+    columns["bend_more"] = sigmas * SIGMA * more * (columns["round_size"] - columns["bend_size"])
+    clean = 1.0 + 2.0 * t + sigmas * SIGMA * columns[f"{truth}_size"]
+    observed = clean + SIGMA * np.random.default_rng(2).normal(size=len(t))
+    roundness = (Parameter("bend_more", (0.5,), 0.0, bound),) if more else ()
+
+    def effect(name, acts_on="", also=()):
+        own = (Parameter(f"{name}_size", amplitude=True), *also)
+        return Effect(name, "linear", "", (Variant("only", own),), acts_on=acts_on)
+
+    test = Linear(readings(observed, run=run), columns, ("a", "b"), noise=SIGMA)
+    test.effects, test.terms = [effect("bend", also=roundness)], [effect("round", "reading")]
+    test.terms_are_rivals, test.imitated = False, imitated or {}
+    test.each_its_own_way = False
+    return test
+
+
 @pytest.mark.parametrize(
     ("truth", "sigmas", "found", "rivals"),
     [
@@ -93,21 +123,28 @@ def test_slow_noise_is_doubted_sooner_beside_a_name(correlation, beside, alone):
 )
 def test_a_term_that_imitates_an_effect_is_tried_beside_it(truth, sigmas, found, rivals):
     """It takes the effect's place where readings say so, and is its rival where they do not."""
-    t = np.tile(np.linspace(0.0, 1.0, 60), 4)
-    run = np.repeat(np.arange(4), 60)
-    columns = {"a": np.ones_like(t), "b": t, "bend_size": np.maximum(t - 0.5, 0.0)}
-    columns["round_size"] = 0.05 * np.log1p(np.exp((t - 0.5) / 0.05))
-    clean = 1.0 + 2.0 * t + sigmas * SIGMA * columns[f"{truth}_size"]
-    observed = clean + SIGMA * np.random.default_rng(2).normal(size=len(t))
-
-    def effect(name, acts_on=""):
-        amplitude = Parameter(f"{name}_size", amplitude=True)
-        return Effect(name, "linear", "", (Variant("only", (amplitude,)),), acts_on=acts_on)
-
-    test = Linear(readings(observed, run=run), columns, ("a", "b"), noise=SIGMA)
-    test.effects, test.terms = [effect("bend")], [effect("round", "reading")]
-    test.terms_are_rivals, test.imitated = False, {"bend": ("round",)}
-    test.each_its_own_way = False
-    said = diagnose_test(test)
+    said = diagnose_test(curved(truth, sigmas, imitated={"bend": ("round",)}))
     assert [e.name for e in said.effects] == [found]
     assert said.rivals[found] == rivals
+
+
+@pytest.mark.parametrize(("sigmas", "found"), [(80.0, "round"), (8.0, "bend")])
+def test_what_is_beaten_decisively_is_not_named(monkeypatch, sigmas, found):
+    """Not even by a term that does not account for the readings by itself."""
+    accounts = Judge.accounts
+
+    def no_term_accounts(self, model, baseline):
+        alone = len(model.effects) == 1 and len(self._effects) == 1
+        return accounts(self, model, baseline) and not (alone and not model.effects[0].listed)
+
+    monkeypatch.setattr(Judge, "accounts", no_term_accounts)
+    said = diagnose_test(curved("round", sigmas, imitated={"bend": ("round",)}))
+    assert [e.name for e in said.effects] == [found]
+
+
+@pytest.mark.parametrize(("bound", "rivals"), [(0.7, ["round"]), (5.0, [])])
+def test_a_form_at_the_edge_may_stand_for_another_law(bound, rivals):
+    said = diagnose_test(curved("round", 60.0, more=1.0, bound=bound))
+    at_the_edge = [name for name in said.final.at_bound if name == "bend_more"]
+    assert [e.name for e in said.effects] == ["bend"] and bool(at_the_edge) is bool(rivals)
+    assert said.rivals["bend"] == rivals

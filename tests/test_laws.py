@@ -29,6 +29,7 @@ from fabric_fenicsx.loop.kinds.picture_frame.variant import FrameVariant
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.mechanics.laws import LAWS
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw, per_area
+from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw
 from fabric_fenicsx.rigs.cases import CrossoverKeys
 from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.rigs.load import load_case
@@ -379,6 +380,26 @@ def net_force(law):
 def test_the_net_and_the_single_crossing_have_the_same_force(law):
     """The moment m of a case: on the net's crossings times their area, in the loop as it is."""
     compare_net_and_crossing(sample(law))
+
+
+@pytest.mark.parametrize(
+    ("base", "gamma", "before", "moment"),
+    [
+        ("outward", 0.3, 0.2, 3.0),
+        ("outward", 0.2, 0.3, 0.0),
+        ("outward", 0.3, 0.3, 0.0),
+        ("outward", -0.3, -0.2, -3.0),
+        ("outward", -0.2, -0.3, 0.0),
+        ("forward", 0.3, 0.2, 3.0),
+        ("forward", 0.2, 0.3, 0.0),
+        ("forward", -0.3, -0.2, 0.0),
+        ("forward", -0.2, -0.3, 3.0),
+    ],
+)
+def test_moments_on_one_way_alone(base, gamma, before, moment):
+    # The rate is beyond its reach, if there is one.
+    law = ShapedLaw(base, "rate", 0.05, (1.0,), constant=2.0)
+    assert evaluated(law.moment(crossing(gamma, before))) == pytest.approx(moment)
 
 
 @pytest.mark.parametrize(

@@ -59,13 +59,13 @@ def diagnose_test(
     own = [effect.name for effect in found.effects]
     alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
     in_its_way = experiment.each_its_own_way and search.specimens_differ
-    rivals = bool(own) and (experiment.terms_are_rivals or in_its_way)
+    rivals = experiment.terms_are_rivals or in_its_way or _at_the_edge(found)
+    rivals = bool(own) and rivals
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
         least = -CRITERIA.decisive
-    elif search.doubtful_noise or rivals or _at_the_edge(found):
-        # Before noise is said to be more than was stated, or as slow as a misfit, terms are tried;
-        # and where a form ends at the edge of what it may be, as one that stands for another law.
+    elif search.doubtful_noise or rivals:
+        # Before noise is said to be more than was stated, or as slow as a misfit, terms are tried.
         terms = [t for t in experiment.terms if not set(own) & set(t.general_form_of)]
         least = CRITERIA.decisive
     elif alike:
@@ -95,7 +95,10 @@ def diagnose_test(
 
 
 def _at_the_edge(found: Diagnosis) -> bool:
-    """Whether a number of the effects that were found, other than an amplitude, is at its bound."""
+    """Whether a number of the effects that were found, other than an amplitude, is at its bound.
+
+    A form at the edge of what it may be may stand for another law.
+    """
     free = {p.name for v in found.final.variants for p in v.parameters if not p.amplitude}
     return bool(free & set(found.final.at_bound))
 
