@@ -21,7 +21,7 @@ from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitting import Fit, fit
 from .judge import Model
-from .models import Models
+from .models import Models, nothing_left
 from .noise import quantum
 from .notes import errors_beside, noise_source, notes_of
 from .rivals import pairs_of, rivals_of
@@ -174,6 +174,8 @@ class Search:
             fewer = self.models.with_these_variances(levels[-1][0])
             levels.append(self._together(count, fewer))
             self._with_one_less(levels)
+            # With an effect of which nothing is left it is a model of fewer, which is among those.
+            levels[-1] = [m for m in levels[-1] if not nothing_left(m.fit)]
         return candidates, [level for level in levels if level]
 
     def _alone(self) -> tuple[list[Candidate], list[list[Model]]]:
