@@ -89,6 +89,15 @@ def test_what_the_data_do_not_tell_is_not_certain():
     assert lost.predictive_rms(out) == pytest.approx(np.std(model.residual[out]), rel=1e-6)
 
 
+def test_what_is_no_number_is_not_foreseen():
+    line, model = fitted(3)
+    out = line.readings.holdout
+    for lost in (np.nan, np.inf):
+        beyond = replace(model, slopes=np.where(out[:, None], lost, model.slopes))
+        assert beyond.predictive_rms(out) == np.inf
+        assert beyond.predictive_rms(line.readings.fit) == model.predictive_rms(line.readings.fit)
+
+
 class Exponential(Linear):
     """exp(-a t), which a fit does not reach in two evaluations; without noise."""
 
@@ -108,6 +117,31 @@ def test_a_fit_that_ends_at_its_cap_has_not_converged():
     stopped, done = (fit(line, (), {"a": 0.1}, rows, UNIT, evaluations=count) for count in (2, 60))
     assert not stopped.converged and stopped.values["a"] < 4.0
     assert done.converged and done.values["a"] == pytest.approx(5.0, rel=1e-6)
+
+
+class WithAnEnd(Linear):
+    """√(1 - a) t, which is a number at a = 1 and has no slope there; without noise."""
+
+    def __init__(self):
+        line = a_line(0)
+        t = line.columns["b"]
+        super().__init__(replace(line.readings, observed=0.5 * t), {"a": t}, ("a",))
+        self.ends = 0
+
+    def predict(self, variants, values, deviations=NO_DEVIATIONS):
+        t, root = self.columns["a"], np.sqrt(max(1.0 - values["a"], 0.0))
+        self.ends += root == 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return root * t, {"a": -0.5 * t / root}
+
+
+def test_a_fit_turns_back_where_a_model_has_no_slope():
+    line = WithAnEnd()
+    # The first step goes beyond the end.
+    found = fit(line, (), {"a": -8.0}, line.readings.fit, UNIT)
+    assert line.ends and found.values["a"] == pytest.approx(0.75, rel=1e-6)
+    with pytest.raises(SolveError, match="not a number"):
+        fit(line, (), {"a": 1.0}, line.readings.fit, UNIT)
 
 
 def test_parts_that_cannot_be_predicted_are_counted():

@@ -381,8 +381,17 @@ def test_the_net_and_the_single_crossing_have_the_same_force(law):
     compare_net_and_crossing(sample(law))
 
 
-def test_a_state_of_rest_that_moves_is_the_same_in_both():
-    compare_net_and_crossing(sample("shaped") | {"base": "rest", "constant": 0.02})
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        {"base": "rest", "constant": 0.02},
+        {"base": "odd", "variable": "angle", "shape": "periodic", "width": 0.3},
+        {"base": "elastic", "variable": "recent_square_of_angle", "reach": 0.3, "memory_s": 20.0},
+    ],
+    ids=["state of rest", "wave", "mean square"],
+)
+def test_other_factors_are_the_same_in_both(numbers):
+    compare_net_and_crossing(sample("shaped") | numbers)
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,17 @@ def slipping_grips(t, D, speed):
     return given_way(t, D, lambda force, behind, h: max(behind, 0.0015 * force * abs(force)))
 
 
+def deaf_cell(t, D, speed):
+    """Forces below 3 N are hardly read."""
+    force = force_of(D, speed)
+    return force / (1.0 + np.exp(-(np.abs(force) - 3.0) / 0.4))
+
+
+def warming_cell(t, D, speed):
+    """It reads up to a fifth more, after 60 s."""
+    return force_of(D, speed) * (1.0 + 0.2 * (1.0 - np.exp(-t / 60.0)))
+
+
 RUNS = {"a": PROGRAMME, "b": PROGRAMME[::-1][1:], "c": LAST}
 
 
@@ -128,6 +139,11 @@ def wearing_spring(t, D, speed, run):
     return force_of(D, speed) - 0.04 * run * still
 
 
+def ageing_cell(t, D, speed, run):
+    """Each run it reads 5 % more of what it read as new."""
+    return force_of(D, speed) * (1.0 + 0.05 * run)
+
+
 def wandering_zero(t, D, speed, run):
     """The crosshead's zero is 0.05 mm further with each run."""
     return force_of(D - 0.05 * run, speed)
@@ -148,13 +164,18 @@ def dusty_crossings(t, D, speed, run):
         (dusty_crossings, "dissipative_moment_of_run", 0.02),
         (wearing_spring, "elastic_moment_of_run", -0.04),
         (wandering_zero, "travel_of_run", -0.05),
+        (ageing_cell, "reading_of_force_and_run", 0.05),
     ],
 )
 def test_what_changes_from_run_to_run(tmp_path, measured, term, slope):
     """Leaves noise in the run held out between them, and is as large as it was put in."""
     experiment = write(tmp_path / "set", measured, MORE)
     (variant,) = (
-        v for t in experiment.terms if t.name == term for v in t.variants if v.label == "linear"
+        v
+        for t in experiment.terms
+        if t.name == term
+        for v in t.variants
+        if v.label in ("linear", "gain, linear")
     )
     readings, white = experiment.readings, Variances(Noise(NOISE))
     rows, holdout = readings.fit, readings.holdout & readings.usable
@@ -294,6 +315,8 @@ def test_a_guide_that_sticks_keeps_its_sign():
         (creeping_grips, "travel_of_recent_force", "linear"),
         (slipping_grips, "travel_of_largest_force", "5 coefficients"),
         (rubbing_guide, "reading_of_force_and_direction", "each side its own, kept in a hold"),
+        (deaf_cell, "reading_of_force", "gain, step"),
+        (warming_cell, "reading_of_force_and_time", "gain, saturation"),
     ],
 )
 def test_what_remembers_leaves_noise(tmp_path, measured, term, label):
@@ -341,6 +364,10 @@ def test_derivatives_of_what_remembers(tmp_path, name):
         ("reading_of_force_lag", "linear"),
         ("reading_of_force", "each side its own"),
         ("reading_of_time", "saturation"),
+        ("reading_of_force", "gain, step"),
+        ("reading_of_speed", "friction, saturation"),
+        ("reading_of_force_and_time", "gain, 2 coefficients"),
+        ("reading_of_force_and_run", "gain, linear"),
         ("travel_of_recent_force", "2 coefficients"),
         ("travel_of_largest_force", "step"),
         ("travel_of_displacement_lag", "linear"),

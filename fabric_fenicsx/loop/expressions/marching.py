@@ -3,13 +3,14 @@
     y_i = f(x_i, h_i; p),    h_{i+1} = g(x_i, h_i; p),    h_0 = 0 or given
     dy_i/dp = ∂f/∂p + ∂f/∂x dx_i/dp + ∂f/∂h dh_i/dp,    and dh/dp is marched along with h
 
-f and g are UFL; so are their derivatives. Records stand side by side, (n_points, n_records), and
-are marched together.
+f and g are UFL, taken apart into single operations, which the chain rule differentiates. Records
+stand side by side, (n_points, n_records), and are marched together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections import OrderedDict
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -17,12 +18,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...mechanics.scalars import derivative_of, evaluated, lowered, steps_of, symbol
+from ...mechanics.chain_rule import differentiated
+from ...mechanics.scalars import evaluated, lowered, parted, steps_of, symbol
 from .compiled import march
 
-__all__ = ["Marched", "Varying"]
+__all__ = ["Marched", "Varying", "spread"]
 
 Array = npt.NDArray[np.float64]
+
+MOST_KEPT = 64
+"""Of so many expressions is kept what does not change: of all, memory would grow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +79,10 @@ class Marched:
         symbols = self.at | self._memory
         self._written = list(outputs.values())
         remembered = [history[name.removeprefix("remembered ")] for name in self._memory]
-        self._history = _Differentiated(remembered, symbols, symbols)
+        written = steps_of([lowered(expression) for expression in remembered], symbols)
+        self._history, self._partials = differentiated(written, symbols)
+        # A memory that no parameter goes into is the same loop for every law that has it.
+        self._own = [p for p in self.parameters if ("given", p) in self._history.operations]
         return self
 
     def __call__(
@@ -95,11 +103,18 @@ class Marched:
         numbers = {name: values[name] for name in self.parameters}
         shape = next(iter(known.values())).value.shape
         if self._memory:
-            known |= self._march(known, numbers, shape, first)
+            begin = {
+                name: first.get(name.removeprefix("remembered "), 0.0) for name in self._memory
+            }
+            if self._own or any(varying.slopes for varying in known.values()):
+                known |= self._march(known, numbers, shape, begin)
+            else:
+                given = [*(varying.value for varying in known.values()), *begin.values()]
+                known |= _kept(self, given, lambda: self._march(known, numbers, shape, begin))
         at = {name: varying.value for name, varying in known.items()} | numbers
         results = self._differentiated(known)(at)
         return {
-            name: Varying(np.broadcast_to(value, shape), _chained(partials, known, numbers))
+            name: Varying(spread(value, shape), _chained(partials, known, numbers))
             for name, (value, partials) in zip(self._names, results, strict=True)
         }
 
@@ -107,10 +122,8 @@ class Marched:
         """The outputs with derivatives in what depends on a parameter, made when first wanted."""
         moving = tuple(name for name, varying in known.items() if varying.slopes)
         if moving not in self._outputs:
-            by = {name: self.at[name] for name in self.parameters}
-            symbols = self.at | self._memory
-            by |= {name: symbols[name] for name in moving}
-            self._outputs[moving] = _Differentiated(self._written, symbols, by)
+            symbols, by = self.at | self._memory, (*self.parameters, *moving)
+            self._outputs[moving] = _Differentiated(self._written, symbols, self.parameters, by)
         return self._outputs[moving]
 
     def _march(
@@ -118,31 +131,24 @@ class Marched:
         known: dict[str, Varying],
         numbers: dict[str, float],
         shape: tuple[int, ...],
-        first: Mapping[str, Array],
+        first: Mapping[str, Any],
     ) -> dict[str, Varying]:
         """What is remembered before each point."""
-        # A memory that no parameter goes into is the same loop for every law that has it.
-        own = [p for p in self.parameters if ("given", p) in self._history.steps.operations]
-        active = sorted({*own, *(p for v in known.values() for p in v.slopes)})
+        active = sorted({*self._own, *(p for v in known.values() for p in v.slopes)})
         place = {p: k for k, p in enumerate(active)}
-        x = np.stack([np.broadcast_to(known[name].value, shape) for name in self.inputs])
+        x = np.stack([spread(known[name].value, shape) for name in self.inputs])
         dx = np.zeros((len(self.inputs), len(active), *shape))
         for k, name in enumerate(self.inputs):
             for p, slope in known[name].slopes.items():
                 dx[k, place[p]] = slope
-        values = np.array([numbers[name] for name in own])
-        slot = np.array([place[name] for name in own], dtype=int)
+        values = np.array([numbers[name] for name in self._own])
+        slot = np.array([place[name] for name in self._own], dtype=int)
         if self._loop is None:
-            self._loop = march(
-                self._history.steps,
-                self._history.partials,
-                self.inputs,
-                tuple(self._memory),
-                tuple(own),
-            )
+            memory, own = tuple(self._memory), tuple(self._own)
+            self._loop = march(self._history, self._partials, self.inputs, memory, own)
         h0 = np.zeros((len(self._memory), shape[1]))
         for k, name in enumerate(self._memory):
-            h0[k] = first.get(name.removeprefix("remembered "), 0.0)
+            h0[k] = first[name]
         h, dh = self._loop(x, dx, values, slot, h0)
         return {
             name: Varying(h[k], dict(zip(active, dh[k], strict=True)))
@@ -153,38 +159,62 @@ class Marched:
 class _Differentiated:
     """Values of expressions with their partial derivatives.
 
+    What depends on the inputs alone is kept for as long as the same arrays come in: nearly all of
+    a law that is linear in its parameters.
+
     Args:
         expressions: in the symbols.
         symbols: of all that is given.
-        by: those that derivatives are taken in, where an expression depends on them.
-
-    Attributes:
-        steps: the expressions, then the derivatives.
-        partials: for each expression, by symbol the number of the derivative.
+        parameters: names of those that are numbers.
+        by: names of those that derivatives are taken in, where an expression depends on them.
     """
 
     def __init__(
-        self, expressions: list[Any], symbols: dict[str, Any], by: Mapping[str, Any]
+        self,
+        expressions: list[Any],
+        symbols: dict[str, Any],
+        parameters: Collection[str],
+        by: Collection[str],
     ) -> None:
-        flat = [lowered(expression) for expression in expressions]
-        self.partials: list[dict[str, int]] = []
-        for expression in flat[: len(expressions)]:
-            own = {}
-            for name, one in by.items():
-                derivative = derivative_of(expression, one)
-                if not (derivative == 0):
-                    own[name] = len(flat)
-                    flat.append(derivative)
-            self.partials.append(own)
-        self.steps = steps_of(flat, symbols)
-        self._evaluate = evaluated(self.steps)
+        written = steps_of([lowered(expression) for expression in expressions], symbols)
+        steps, self._partials = differentiated(written, by)
+        still, moving = parted(steps, parameters)
+        self._inputs = [name for operator, name in still.operations if operator == "given"]
+        self._still, self._moving = evaluated(still), evaluated(moving)
 
     def __call__(self, at: Mapping[str, Any]) -> list[tuple[Any, dict[str, Any]]]:
-        values = self._evaluate(at)
+        given = [at[name] for name in self._inputs]
+        kept = _kept(self, given, lambda: self._of_the_inputs(at))
+        values = self._moving({**at, **kept})
         return [
             (values[k], {name: values[place] for name, place in own.items()})
-            for k, own in enumerate(self.partials)
+            for k, own in enumerate(self._partials)
         ]
+
+    def _of_the_inputs(self, at: Mapping[str, Any]) -> dict[str, Any]:
+        """The values that depend on the inputs alone, by their number."""
+        return {str(k): value for k, value in enumerate(self._still(at))}
+
+
+_KEPT: OrderedDict[Any, tuple[list[Any], dict[str, Any]]] = OrderedDict()
+"""Of the expressions used last: the arrays given, and what was made of them."""
+
+
+def _kept(owner: Any, given: list[Any], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """What was made for an owner of the same arrays, or what is made now."""
+    last = _KEPT.get(owner)
+    if last is None or any(a is not b for a, b in zip(last[0], given, strict=True)):
+        last = _KEPT[owner] = given, make()
+        if len(_KEPT) > MOST_KEPT:
+            _KEPT.popitem(last=False)
+    _KEPT.move_to_end(owner)
+    return last[1]
+
+
+def spread(values: Any, shape: tuple[int, ...]) -> Array:
+    """Values in a shape to which they broadcast."""
+    same = getattr(values, "shape", None) == shape
+    return np.asarray(values) if same else np.broadcast_to(values, shape)
 
 
 def _chained(
@@ -193,7 +223,10 @@ def _chained(
     """Total derivatives by parameter, from partial ones in parameters, inputs and memory."""
     slopes: dict[str, Any] = {}
     for name, partial in partials.items():
-        through = {name: 1.0} if name in numbers else known[name].slopes
-        for p, slope in through.items():
-            slopes[p] = slopes.get(p, 0.0) + partial * slope
+        if name in numbers:
+            slopes[name] = slopes[name] + partial if name in slopes else partial
+            continue
+        for p, slope in known[name].slopes.items():
+            part = partial * slope
+            slopes[p] = slopes[p] + part if p in slopes else part
     return slopes

@@ -116,10 +116,12 @@ class Fit:
         A prediction is as uncertain as the parameters it is made with, those of a specimen that
         was not fitted among them, and its errors go together: with G Gᵀ the covariance of what is
         expected, white, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum of squares. NaN if there are
-        none.
+        none; infinite where what is expected, or its slope, is not a number.
         """
         if not rows.any():
             return float("nan")
+        if not (np.isfinite(self.residual[rows]).all() and np.isfinite(self.slopes[rows]).all()):
+            return float("inf")
         whiten = self.variances.noise.whitener(self.readings, rows)
         r, G = whiten(self.residual[rows]), whiten(self.slopes[rows] @ self.root)
         along, size, _ = np.linalg.svd(G, full_matrices=False)
@@ -374,7 +376,10 @@ class _Model:
                 for name in self._groups[group]
             }
             found = self._experiment.predict(self._variants, values, deviations)
-            if not np.isfinite(found[0][self._used]).all():
+            # Where an angle is at the end of its range the force is a number, its slope is none.
+            if not all(
+                np.isfinite(one[self._used]).all() for one in (found[0], *found[1].values())
+            ):
                 raise SolveError("the model is not a number at these parameters")
             self._cache[key] = found
         return self._cache[key]

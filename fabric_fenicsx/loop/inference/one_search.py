@@ -245,13 +245,14 @@ class Search:
     def _added_to(self, model: Fit) -> list[Combination]:
         """Every form of every other effect beside those of a model, about that model.
 
-        Where a model is far from linear, what lacks beside it is not seen about the baseline.
+        Those over two variables as well, of which no two are looked at together. Where a model is
+        far from linear, what lacks beside it is not seen about the baseline.
         """
         present, known = self.models.effects_of(model), set(model.values)
         alike, _ = self.experiment.predict(model.variants, model.values)
         return [
             ((variant, shape),)
-            for effect in self.effects
+            for effect in (*self.effects, *self._of_two)
             if effect not in present
             for variant in effect.variants
             if known.isdisjoint(p.name for p in variant.parameters)

@@ -63,8 +63,9 @@ def diagnose_test(
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
         least = -CRITERIA.decisive
-    elif search.doubtful_noise or rivals:
-        # Before noise is said to be more than was stated, or as slow as a misfit, terms are tried.
+    elif search.doubtful_noise or rivals or _at_the_edge(found):
+        # Before noise is said to be more than was stated, or as slow as a misfit, terms are tried;
+        # and where a form ends at the edge of what it may be, as one that stands for another law.
         terms = [t for t in experiment.terms if not set(own) & set(t.general_form_of)]
         least = CRITERIA.decisive
     elif alike:
@@ -83,9 +84,20 @@ def diagnose_test(
         elif search.effects_needed == 1:
             _name(single, other, other.effects[0], search, found.effects[0])
         return _beside(other, found)
+    nearest = min((m.criterion for m in single.singles), default=float("inf"))
+    if own and not single.accounted and nearest < final.criterion - CRITERIA.decisive:
+        # What is beaten so is not it, whether or not what beats it is all that there is.
+        further.most = None
+        return _beside(further.run(), found)
     if search.effects_needed == 1 and (rivals or alike):
         _name_terms(search, found, final, single, other)
     return found
+
+
+def _at_the_edge(found: Diagnosis) -> bool:
+    """Whether a number of the effects that were found, other than an amplitude, is at its bound."""
+    free = {p.name for v in found.final.variants for p in v.parameters if not p.amplitude}
+    return bool(free & set(found.final.at_bound))
 
 
 def _beside(further: Diagnosis, found: Diagnosis) -> Diagnosis:

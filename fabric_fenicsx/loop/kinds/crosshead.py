@@ -23,7 +23,7 @@ from scipy.optimize import nnls
 from ...inputs.parameters import Parameter
 from ...mechanics.laws.dashpots import LinearDashpot
 from ...mechanics.laws.springs import PolynomialSpring
-from ..expressions.marching import Marched, Varying
+from ..expressions.marching import Marched, Varying, spread
 from ..inference.effects import Effect, Variant, of_each_run, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ..inference.noise import estimated_noise
@@ -345,7 +345,7 @@ class CrossheadTest:
         work, shape = moment * factor, factor.value.shape
         return Varying(
             self._gathered(work.value),
-            {p: self._gathered(np.broadcast_to(slope, shape)) for p, slope in work.slopes.items()},
+            {p: self._gathered(spread(slope, shape)) for p, slope in work.slopes.items()},
         )
 
     def _moment(

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...mechanics.scalars import derivative_of
-from ..expressions.marching import Marched, Varying
+from ..expressions.marching import Marched, Varying, spread
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
 from .records import laid_out
@@ -40,7 +40,7 @@ class RecordedRig:
 
     def at_readings(self, values: Array) -> Array:
         """Of values at the points those at every reading, (n,)."""
-        return np.broadcast_to(values, self.points["D"].value.shape)[self.place]
+        return spread(values, self.points["D"].value.shape)[self.place]
 
     def travel(self, variant: FrameVariant | None, values: Mapping[str, float]) -> Any:
         """True displacement of the frame, and its rate."""
@@ -81,10 +81,10 @@ class RecordedRig:
     def known(self, force: Varying) -> dict[str, Callable[[], Varying]]:
         """What is known at a reading, by the names of FrameVariant.of, where it is wanted."""
         return {
-            "time": self._since_start,
+            "time": lambda: self._since_start,
             "displacement": lambda: self.points["D"],
             "speed": lambda: self.points["D_rate"],
-            "acceleration": lambda: self.per_second(self.points["D_rate"]),
+            "acceleration": lambda: self._acceleration,
             "force": lambda: force,
             "force_rate": lambda: self.per_second(force),
             "per_time": lambda: self.points["per_time"],
@@ -95,10 +95,16 @@ class RecordedRig:
         """A number of each run at its points."""
         return Varying(np.broadcast_to(numbers, self.points["time"].value.shape))
 
+    @cached_property
     def _since_start(self) -> Varying:
         """Time in each run [s]."""
         time = self.points["time"].value
         return Varying(time - time[0])
+
+    @cached_property
+    def _acceleration(self) -> Varying:
+        """Of the crosshead [mm/s²]."""
+        return self.per_second(self.points["D_rate"])
 
     def per_second(self, x: Varying) -> Varying:
         """How fast something changes along each record: differences of second order within it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ... import __version__
-from ...mechanics.laws.shaped import OF_ELASTIC
+from ...mechanics.laws.shaped import OF_ELASTIC, shape_of
 from ..inference.effects import valued
 from .discovered import Discovered
 
@@ -140,7 +140,7 @@ def effect_file(term: Discovered, titles: str) -> str:
         carried: str = getattr(term.variant, "carried", "")
         words["carried"] = f'\n            carried="{carried}",' if carried else ""
         return (HEAD + LAW).format(numbers=lines, **words)
-    kept = ("memory", "turning", "slow", "stick_angle")
+    kept = ("memory", "turning", "slow", "gain", "stick_angle")
     more = "".join(f", {key}={numbers.pop(key)!r}" for key in kept if key in numbers)
     if "of" in numbers:
         words["found"] = FOUND_OF_THE_RUN.format(base=numbers.pop("of"), options=more)
@@ -148,5 +148,7 @@ def effect_file(term: Discovered, titles: str) -> str:
         rig = {"variable": numbers.pop("variable"), "options": more, **words}
         words["found"] = FOUND_OF_THE_RIG.format(**rig)
     numbers["kind"], constant = numbers.pop("shape"), numbers.pop("constant", 0.0)
+    if numbers.pop("from_the_top", False):
+        constant = -float(shape_of(x=1.0, **numbers))
     lines = "\n".join(f"    {name!r}: {value!r}," for name, value in numbers.items())
     return (HEAD + OF_THE_RIG).format(numbers=lines, constant=constant, **words)

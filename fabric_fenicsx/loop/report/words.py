@@ -17,6 +17,8 @@ PARAMETER_UNITS = {
     "rad_per_N": "rad/N",
     "N_mm3": "N mm³",
     "1_mm": "1/mm",
+    "rad2_s2": "rad²/s²",
+    "rad2": "rad²",
     "rad_s": "rad/s",
     "rad": "rad",
     "N_s": "N s",

@@ -25,9 +25,11 @@ Variable = Literal[
     "recent_angle",
     "recent_largest_angle",
     "recent_rate",
+    "recent_square_of_angle",
+    "recent_square_of_rate",
 ]
 AtHand = Literal["angle", "rate"]
-Kind = Literal["spline", "graded", "step", "saturation", "logarithm"]
+Kind = Literal["spline", "graded", "step", "saturation", "logarithm", "periodic"]
 Base = Literal[
     "elastic",
     "rest",
@@ -89,6 +91,10 @@ VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
         past * _kept(at.per_time, memory), at.size
     ),
     "recent_rate": lambda at, past, memory: recent(size_of(at.rate), past, at.per_time, memory),
+    "recent_square_of_angle": lambda at, past, memory: recent(
+        at.gamma**2, past, at.per_time, memory
+    ),
+    "recent_square_of_rate": lambda at, past, memory: recent(at.rate**2, past, at.per_time, memory),
 }
 """What a factor may depend on, from the crossing, its value at the step before, and τ [s].
 
@@ -230,7 +236,7 @@ class ShapedLaw(CrossingLaw):
     constant: Any = number("constant", "of the factor where the variable is nothing", float, 0.0)
     shape: Kind = number("shape", "of the factor", Kind, "spline")
     place: Any = number("place", "of a step, as a share of the reach", NotNegative, 0.5)
-    width: Any = number("width", "of a step or a saturation, as a share of it", Positive, 0.1)
+    width: Any = number("width", "of a step, saturation or wave, as a share of it", Positive, 0.1)
     k1: Any = per_area("k1_N_mm", "linear part of the elastic base", NotNegative, 0.0)
     k3: Any = per_area("k3_N_mm", "cubic part of the elastic base", NotNegative, 0.0)
     stick_angle: Any = in_degrees("stick_angle_deg", "of a friction", default=0.5)

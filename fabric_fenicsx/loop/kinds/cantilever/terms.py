@@ -25,30 +25,27 @@ from ufl import conditional, exp, lt, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.bending_laws import TabulatedBending
-from ....mechanics.laws.shaped import shape_of
 from ....mechanics.scalars import numpy_function, symbol
 from ...inference.effects import Effect, Shape, Values, of_run
 from ..records import FEWEST_BEFORE
+from .shapes import (
+    HEAVIEST,
+    LARGEST,
+    SPLINES,
+    Of,
+    along_the_strip,
+    coefficient,
+    over_runs,
+    splines,
+    wave,
+)
 from .variant import StripVariant
 
 __all__ = ["strip_term", "terms"]
 
-#: Numbers of coefficients of a spline.
-SPLINES = (1, 2)
-#: Where a step, or a bump, may begin to be looked for, as a share of the longest strip.
-STEPS, BUMPS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
-#: How wide they are.
-WIDTH, BUMP_WIDTHS = 0.03, (0.03, 0.1)
-#: Decays from the clamp or from the free end, as shares of it.
-DECAYS = (0.05, 0.2)
-#: Over how many runs something settles, as a share of them.
-FADING = (0.3, 1.0)
 #: Where flexibility is as without a term: about the middle of where strips bend, so that B is
 #: the stiffness there.
 MIDDLE = 0.2
-#: No coefficient is larger: a moment or a weight that is so many times another is none. But a
-#: bead at the end of a strip, whose weight is all in little of it, is.
-LARGEST, HEAVIEST = 10.0, 100.0
 #: Curvatures by which a moment is half way to what it is at large ones, as shares of the largest.
 HALF_WAY = (0.1, 0.6)
 #: Places are seen within this many times the largest reading.
@@ -59,12 +56,6 @@ PER_C1 = "stiffness_per_C1"
 TABULATED = 25
 #: Places are counted from there.
 ENDS = ("clamp", "free end")
-
-Of = Callable[[Values, Any], Any]
-"""An expression of the values of parameters and of a variable."""
-
-Drawn = tuple[str, tuple[Parameter, ...], Of]
-"""A shape over one variable: label, parameters, and the expression."""
 
 
 def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
@@ -146,7 +137,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
             added_moment=partial(_flexible, g, end, longest),
         )
         for end in ENDS
-        for label, parameters, g in _along_the_strip(name, end)
+        for label, parameters, g in along_the_strip(name, end)
     ]
     about = "bending stiffness that varies along the strip"
     yield _term(name, about, "bending_moment", ("arc_length",), forms)
@@ -166,7 +157,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
             laws=partial(_tabulated, g, half.name, ranges) if PER_C1 in ranges else None,
             of_baseline=("C1_MPa",),
         )
-        for label, parameters, g in _splines(name, SPLINES)
+        for label, parameters, g in splines(name, SPLINES)
     ]
     about, of = "any odd law of the curvature", ("nonlinear_bending",)
     yield _term(name, about, "bending_moment", ("curvature",), forms, of)
@@ -188,8 +179,11 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
                 partial(_of_place, unit, g, end, longest),
             )
             for end in ENDS
-            for label, parameters, g in _along_the_strip(
-                name, end, constant=constant, most=LARGEST if constant else HEAVIEST
+            for label, parameters, g in (
+                *along_the_strip(
+                    name, end, constant=constant, most=LARGEST if constant else HEAVIEST
+                ),
+                *([wave(name)] if constant and end == "clamp" else []),
             )
         ]
         yield _term(name, f"{about} that varies along the strip", acts_on, ("arc_length",), forms)
@@ -202,7 +196,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
                 to,
                 partial(_of_strip, unit, g, "length", longest),
             )
-            for label, parameters, g in _splines(name, SPLINES[:1], constant=constant)
+            for label, parameters, g in splines(name, SPLINES[:1], constant=constant)
         ]
         yield _term(name, f"{about} that goes by the overhang", acts_on, ("length",), forms)
 
@@ -297,17 +291,18 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         return StripVariant(f"{to}, {label}", parameters, shape=shape, camera=camera)
 
     name = "reading_of_height"
-    even = _coefficient(f"{name}_0")
+    even = coefficient(f"{name}_0")
     forms = [form("even", (even,), lambda p, x: p[even.name], "z", "scale")]
-    forms += [form(*shape, "z", "scale") for shape in _splines(name, SPLINES)]
+    forms += [form(*shape, "z", "scale") for shape in splines(name, SPLINES)]
     yield _term(name, "scale of heights", "reading", ("height",), forms)
 
     name = "reading_of_distance"
     turn = Parameter(f"{name}_turn_rad", amplitude=True)
     shape = Shape("distance_mm", "height_mm", width, lambda p, x: p[turn.name] * width * x)
     forms = [StripVariant("turned", (turn,), shape=shape, camera=partial(_turned, turn.name))]
-    forms += [form(*shape, "x", "scale") for shape in _splines(name, SPLINES)]
-    forms += [form(*shape, "x", "height") for shape in _splines(name, SPLINES[1:])]
+    forms += [form(*shape, "x", "scale") for shape in splines(name, SPLINES)]
+    forms += [form(*shape, "x", "height") for shape in splines(name, SPLINES[1:])]
+    forms.append(form(*wave(name), "x", "height"))
     about = "heights, or their scale, by the distance from the clamp"
     yield _term(name, about, "reading", ("distance",), forms)
 
@@ -324,7 +319,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     forms = [
         form(*shape, "length", to)
         for to in ("scale", "height")
-        for shape in _splines(name, SPLINES[:1])
+        for shape in splines(name, SPLINES[:1])
     ]
     yield _term(name, "heights, or their scale, by the overhang", "reading", ("length",), forms)
 
@@ -342,7 +337,7 @@ def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
             shape=Shape("runs_before", "log_flexibility", last, g),
             added_moment=partial(_softened, g, last),
         )
-        for label, parameters, g in _over_runs(name)
+        for label, parameters, g in over_runs(name)
     ]
     about = "bending stiffness that changes from run to run of a specimen"
     yield _term(name, about, "bending_moment", ("run",), forms)
@@ -354,21 +349,10 @@ def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
             shape=Shape("runs_before", Y["rest_curvature"], last, partial(_times, bend, g)),
             added_curvature=partial(_of_strip, bend, g, "run", last),
         )
-        for label, parameters, g in _over_runs(name, constant=True)
+        for label, parameters, g in over_runs(name, constant=True)
     ]
     about = "curvature of the unloaded strip that changes from run to run of a specimen"
     yield _term(name, about, "rest_curvature", ("run",), forms)
-
-
-def _over_runs(name: str, *, constant: bool = False) -> Iterator[Drawn]:
-    yield from _splines(name, SPLINES, constant=constant)
-    zero = (_coefficient(f"{name}_0"),) if constant else ()
-    one, width = _coefficient(f"{name}_1"), Parameter(f"{name}_width", FADING, 0.1, 2.0)
-
-    def saturating(p: Values, x: Any) -> Any:
-        return sum(p[c.name] for c in zero) + p[one.name] * (1 - exp(-x / p[width.name]))
-
-    yield "saturation", (*zero, one, width), saturating
 
 
 def _softened(g: Of, last: float, p: Values, at: Values) -> Any:
@@ -431,54 +415,3 @@ def _term(
 
 def _from(label: str, end: str) -> str:
     return f"{label}, from the {end}"
-
-
-# Shapes ---------------------------------------------------------------------------------------
-
-
-def _splines(name: str, counts: Iterable[int], *, constant: bool = False) -> Iterator[Drawn]:
-    """Splines that are 0 at 0, or with a constant of their own."""
-    zero = (_coefficient(f"{name}_0"),) if constant else ()
-    for count in counts:
-        own = tuple(_coefficient(f"{name}_{k + 1}") for k in range(count))
-
-        def spline(p: Values, x: Any, own: Any = own) -> Any:
-            return sum(p[c.name] for c in zero) + _shape("spline", p, own, None, None, x)
-
-        yield f"{count} coefficients" if count > 1 else "linear", (*zero, *own), spline
-
-
-def _along_the_strip(
-    name: str, end: str, *, constant: bool = False, most: float = LARGEST
-) -> Iterator[Drawn]:
-    """Shapes over a place that is counted from one end."""
-    yield from _splines(name, SPLINES if end == "clamp" else SPLINES[:1], constant=constant)
-    one = _coefficient(f"{name}_1")
-    decay = Parameter(f"{name}_width", DECAYS, 0.02, 1.0)
-    much = replace(one, lower=-LARGEST, upper=most) if end != "clamp" else one
-    yield "decay", (much, decay), lambda p, x: p[one.name] * exp(-x / p[decay.name])
-    if end != "clamp":
-        # Nothing much bends there: a place of its own would hardly be known.
-        return
-    place = Parameter(f"{name}_place", STEPS, 0.0, 1.0)
-    width = Parameter(f"{name}_width", (WIDTH,), 0.01, 0.3)
-    yield (
-        "step",
-        (one, place, width),
-        lambda p, x: _shape("step", p, (one,), p[place.name], p[width.name], x),
-    )
-    about = Parameter(f"{name}_place", BUMPS, 0.0, 1.0)
-    wide = Parameter(f"{name}_width", BUMP_WIDTHS, 0.02, 0.4)
-    yield (
-        "bump",
-        (one, about, wide),
-        lambda p, x: p[one.name] * exp(-(((x - p[about.name]) / p[wide.name]) ** 2)),
-    )
-
-
-def _coefficient(name: str) -> Parameter:
-    return Parameter(name, lower=-LARGEST, upper=LARGEST, amplitude=True)
-
-
-def _shape(kind: str, p: Values, own: Iterable[Parameter], place: Any, width: Any, x: Any) -> Any:
-    return shape_of(kind, tuple(p[c.name] for c in own), x, place, width)

@@ -15,7 +15,7 @@ from typing import Any
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import product_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .shapes import FORGETFUL, X, Y, fitted, remembered_since, shapes
+from .shapes import FORGETFUL, SQUARES, X, Y, fitted, remembered_since, shapes
 from .terms import as_reported, of_a_law, ranges_of, remembering
 from .variant import FrameVariant
 
@@ -120,7 +120,8 @@ def _shapes(
     name: str, kind: _Kind, variable: str, powers: Sequence[int]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Label and numbers of f_p: as many coefficients of each, places and widths in common."""
-    wealth = 1 if variable == "unloading" else 2 if variable in FORGETFUL else kind.wealth
+    few = 2 if variable in FORGETFUL else kind.wealth
+    wealth = 1 if variable in ("unloading", *SQUARES) else few
     for label, one, numbers in shapes(name, wealth):
         if len(powers) * len(one) > MOST:
             continue

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
-import numpy as np
 from ufl import conditional, gt, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.law import size_of
 from ....mechanics.laws.shaped import recent, shape_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .shapes import Ends, X, Y, factor, fitted, memory_of, over_runs, shapes, wealth
+from .shapes import Ends, X, Y, factor, fitted, memory_of, over_runs, shapes, wave, wealth
 from .variant import FrameVariant
 
 __all__ = ["RIG_VARIABLES", "RigVariable", "of_the_rig", "rig_terms"]
 
-#: Most cycles over the range that a periodic term is looked for with, and their step: closer
-#: together two waves over the range are alike.
-CYCLES, STEP = {"time": 40.0, "displacement": 16.0}, 0.5
+#: Most cycles over the range that a periodic term is looked for with.
+CYCLES = {"time": 40.0, "displacement": 16.0}
 #: Share of the largest speed below which its sign is rounded.
 SLOW = 1e-3
 #: Memories of what lags, as shares of the longest run: a filter's are short.
@@ -70,6 +68,8 @@ RIG_VARIABLES = {
         partial(_itself, "memory"),
         lambda at, past, memory: max_value(past, size_of(at["force"])),
     ),
+    "force_size": RigVariable(("force",), lambda at: size_of(at["force"])),
+    "speed_size": RigVariable(("speed",), lambda at: size_of(at["speed"])),
     "force_lag": RigVariable(
         ("force", "per_time"), partial(_lag, "force"), partial(_mean, "force")
     ),
@@ -106,6 +106,9 @@ RIG: dict[str, dict[str, tuple[str, ...]]] = {
 AGAINST_THE_MOTION = ("displacement", "force")
 """What a friction of the rig may depend on; the load cell reads it with the sign of the speed."""
 
+GAINS = ("time", "displacement", "run")
+"""What a load cell's gain may change with, beside the force."""
+
 LINES = ("force_rate", "acceleration", "force_lag", "displacement_lag")
 """Variables of which a term is a multiple."""
 
@@ -122,17 +125,28 @@ def rig_terms(largest: Mapping[str, float], ends: Ends) -> Iterator[Effect]:
             if variable not in largest:
                 continue
             name = f"{acts_on}_of_{variable}"
-            forms = _forms(acts_on, name, variable, largest, ends)
+            forms = [*_forms(acts_on, name, variable, largest, ends)]
+            if name == "reading_of_force":
+                forms += _forms(acts_on, name, "force_size", largest, ends, gain=True)
+            if name == "reading_of_speed":
+                forms += _forms(acts_on, name, "speed_size", largest, ends, "at its rate")
             yield _term(acts_on, name, reported, forms)
     for variable in AGAINST_THE_MOTION:
         name = f"reading_of_{variable}_and_direction"
         ways: tuple[Turning, ...] = ("kept in a hold", "at its rate")
         both = (f for way in ways for f in _forms("reading", name, variable, largest, ends, way))
         yield _term("reading", name, (variable, "rate"), both)
+    for variable in GAINS:
+        if variable in largest:
+            name = f"reading_of_force_and_{variable}"
+            gains = _forms("reading", name, variable, largest, ends, gain=True)
+            term = _term("reading", name, ("force", variable), gains)
+            # By the displacement it is near to a moment by the angle.
+            yield replace(term, of_two=variable == "displacement")
 
 
 def _term(
-    acts_on: str, name: str, depends_on: tuple[str, ...], forms: Iterator[FrameVariant]
+    acts_on: str, name: str, depends_on: tuple[str, ...], forms: Iterable[FrameVariant]
 ) -> Effect:
     about = f"what acts on the {acts_on}, by {' and '.join(depends_on)}"
     return Effect(
@@ -153,12 +167,13 @@ def _forms(
     largest: Mapping[str, float],
     ends: Ends,
     turning: Turning = "",
+    gain: bool = False,
 ) -> Iterator[FrameVariant]:
     """Forms of what is added."""
-    reach = largest[variable]
+    reach = largest[variable.removesuffix("_size")]
     between = ends.get(variable.removeprefix("recent_"), (0.0, 1.0))
-    shapes_of = list(_added(name, variable, turning))
-    if between[0] < 0.0 < between[1] and variable not in LINES:
+    shapes_of = list(_gains(name, variable) if gain else _added(name, variable, turning))
+    if between[0] < 0.0 < between[1] and variable not in LINES and not gain:
         sides = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("odd", "even"))
         shapes_of.append(
             ("each side its own", {"shape": "sides", "coefficients": sides} | _zero(name, turning))
@@ -172,6 +187,9 @@ def _forms(
             also["memory"] = memory_of(name, largest, *shares)
         if turning:
             also |= {"turning": turning, "slow": SLOW * largest["speed"]}
+        if gain:
+            label, also["gain"] = f"gain, {label}", True
+        y = "share_of_reading" if gain else Y[acts_on]
         yield of_the_rig(
             label if turning != "kept in a hold" else f"{label}, {turning}",
             fitted(own | also),
@@ -181,7 +199,8 @@ def _forms(
             memory=also.get("memory", 0.0),
             turning=turning,
             slow=also.get("slow", 0.0),
-            shape=Shape(X[variable], Y[acts_on], reach, partial(factor, own), own | also, between),
+            gain=gain,
+            shape=Shape(X[variable], y, reach, partial(factor, own), own | also, between),
         )
 
 
@@ -200,6 +219,7 @@ def of_the_rig(
     memory: Any = 0.0,
     turning: Turning = "",
     slow: float = 0.0,
+    gain: bool = False,
     shape: Shape | None = None,
 ) -> FrameVariant:
     """A form of something that acts on the rig.
@@ -214,6 +234,7 @@ def of_the_rig(
         turning: whether that is times the sign of the speed; "kept in a hold" is as it was before,
             as of a friction that sticks, "at its rate" nothing.
         slow: speed below which its sign is rounded, or it holds [mm/s].
+        gain: whether it is a share of the force that is added.
         shape: of a term without a formula.
     """
     kind = RIG_VARIABLES[variable]
@@ -228,6 +249,8 @@ def of_the_rig(
 
     def whole(p: Values, at: Values) -> Any:
         size = added(p, kind.value(at))
+        if gain:
+            return at["force"] * size
         if turning == "kept in a hold":
             return size * at["memory"]
         return size * shape_of("sign", (1.0,), at["speed"], width=slow) if turning else size
@@ -236,12 +259,26 @@ def of_the_rig(
         label,
         parameters,
         shape=shape,
-        of=(*kind.of, "speed") if turning else kind.of,
+        of=tuple(dict.fromkeys((*kind.of, *["force"] * gain, *["speed"] * bool(turning)))),
         remembered=remembered,
         variable=kind.value if kind.remembered is not None else None,
         added_reading=whole if acts_on == "reading" else None,
         added_travel=whole if acts_on == "travel" else None,
     )
+
+
+def _gains(name: str, variable: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Label and numbers of a gain's shapes, which change it from what it is at the beginning.
+
+    That of the force is what it is at the largest one: small ones may not be read at all.
+    """
+    of_the_force = variable == "force_size"
+    chosen = ("step", "saturation") if of_the_force else ()
+    own = over_runs(name) if variable == "run" else shapes(name, 3)
+    for label, coefficients, numbers in own:
+        if label in chosen or not chosen:
+            top = {"from_the_top": True} if of_the_force else {}
+            yield label, numbers | {"coefficients": coefficients} | top
 
 
 def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
@@ -260,6 +297,13 @@ def _zero(name: str, turning: Turning) -> dict[str, Parameter]:
 def _added(name: str, variable: str, turning: Turning) -> Iterator[tuple[str, dict[str, Any]]]:
     """Label and numbers of shapes."""
     one = (Parameter(f"{name}_1", amplitude=True),)
+    if variable == "speed_size":
+        for label, coefficients, numbers in shapes(name, 2):
+            # A friction that falls with the speed, or grows; lines are among the others.
+            if label in ("step", "saturation"):
+                also = {"coefficients": coefficients} | _zero(name, turning)
+                yield f"friction, {label}", numbers | also
+        return
     if variable in LINES:
         yield "linear", {"shape": "spline", "coefficients": one}
         return
@@ -272,10 +316,7 @@ def _added(name: str, variable: str, turning: Turning) -> Iterator[tuple[str, di
     for label, coefficients, numbers in over_runs(name) if variable == "run" else shapes(name, few):
         yield label, numbers | {"coefficients": coefficients} | constant
     if variable in ("time", "displacement") and not turning:
-        waves = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))
-        most = CYCLES[variable]
-        periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
-        period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
+        label, waves, numbers = wave(name, CYCLES[variable])
         # Where a run begins a wave may be anywhere.
         zero = {"constant": Parameter(f"{name}_0", amplitude=True)}
-        yield "periodic", {"shape": "periodic", "coefficients": waves, "width": period} | zero
+        yield label, numbers | {"coefficients": waves} | zero

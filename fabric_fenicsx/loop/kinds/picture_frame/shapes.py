@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import GRADED, shape_of
 from ...inference.effects import Values, valued
 
 __all__ = [
     "FORGETFUL",
+    "SQUARES",
     "Ends",
     "X",
     "Y",
@@ -20,6 +23,7 @@ __all__ = [
     "over_runs",
     "remembered_since",
     "shapes",
+    "wave",
     "wealth",
 ]
 
@@ -33,10 +37,15 @@ PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
 DECAYS = (0.1, 0.3)
 #: Where a logarithm bends over, as shares of it.
 BENDS = (0.01, 0.1)
+#: Steps of how many cycles a wave is looked for with: closer together two are alike.
+STEP = 0.5
 #: Memories, as shares of the longest run.
 MEMORIES = (0.01, 0.05, 0.2)
 
-FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate")
+SQUARES = ("recent_square_of_angle", "recent_square_of_rate")
+"""Of these those that a law is in proportion to, as what heat or a bed takes up is."""
+
+FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate", *SQUARES)
 """Variables of a fading memory."""
 
 CARRIED = {"largest_angle": "largest_angle", "relative_angle": "largest_angle", "path": "path"}
@@ -54,12 +63,16 @@ X = {
     "path": "path_rad",
     "rate": "shear_rate_rad_s",
     "recent_rate": "recent_rate_rad_s",
+    "recent_square_of_angle": "recent_square_of_angle_rad2",
+    "recent_square_of_rate": "recent_square_of_rate_rad2_s2",
     "unloading": "unloading",
     "time": "time_s",
     "displacement": "displacement_mm",
     "speed": "speed_mm_s",
+    "speed_size": "speed_size_mm_s",
     "acceleration": "acceleration_mm_s2",
     "force": "force_N",
+    "force_size": "force_size_N",
     "force_rate": "force_rate_N_s",
     "recent_force": "recent_force_N",
     "largest_force": "largest_force_N",
@@ -91,7 +104,8 @@ def factor(numbers: Mapping[str, Any], values: Values, x: Any) -> Any:
     own = {key: valued(n, values) for key, n in numbers.items()}
     shape = own.pop("shape"), own.pop("coefficients")
     at = {key: own[key] for key in ("place", "width", "ends") if key in own}
-    return own.get("constant", 0.0) + shape_of(*shape, x, **at)
+    top = shape_of(*shape, 1.0, **at) if own.get("from_the_top") else 0.0
+    return own.get("constant", 0.0) - top + shape_of(*shape, x, **at)
 
 
 def memory_of(name: str, largest: Mapping[str, float], *shares: float) -> Parameter:
@@ -117,7 +131,7 @@ def remembered_since(
 
 def wealth(base: str, variable: str) -> int:
     """How many of the splines, which are the more the less else there is to be found."""
-    if variable == "unloading":
+    if variable in ("unloading", *SQUARES):
         return 1
     if (base, variable) in FINE:
         return 5
@@ -137,7 +151,7 @@ def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...],
     if wealth > 1:
         one = (Parameter(f"{name}_1", amplitude=True),)
         place = Parameter(f"{name}_place", PLACES, 0.0, 1.0)
-        width = Parameter(f"{name}_width", WIDTHS, 0.01, 0.5)
+        width = Parameter(f"{name}_width", WIDTHS, 0.002, 0.5)
         yield "step", one, {"shape": "step", "place": place, "width": width}
         decay = Parameter(f"{name}_decay", DECAYS, 0.01, 2.0)
         yield "saturation", one, {"shape": "saturation", "width": decay}
@@ -146,6 +160,14 @@ def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...],
         yield "graded", own, {"shape": "graded"}
         bend = Parameter(f"{name}_bend", BENDS, 1e-3, 1.0)
         yield "logarithm", one, {"shape": "logarithm", "width": bend}
+
+
+def wave(name: str, most: float) -> tuple[str, tuple[Parameter, ...], dict[str, Any]]:
+    """A wave: as a shape. With at most so many cycles over the range."""
+    own = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))
+    periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
+    period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
+    return "periodic", own, {"shape": "periodic", "width": period}
 
 
 def over_runs(name: str) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:

@@ -32,6 +32,7 @@ from .shapes import (
     over_runs,
     remembered_since,
     shapes,
+    wave,
     wealth,
 )
 from .variant import FrameVariant
@@ -40,6 +41,8 @@ __all__ = ["as_reported", "of_a_law", "of_the_run", "ranges_of", "remembering", 
 
 #: Angles in which a friction begins to slide [rad].
 STICKS = (0.005, 0.03)
+#: Most cycles of a moment over the angles, as of tows that ride over each other's crimp.
+CYCLES = 8.0
 
 
 def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> list[Effect]:
@@ -65,6 +68,7 @@ def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
     largest |= {"displacement_lag": ranges["displacement"]}
     largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
     largest["relative_angle"] = 1.0
+    largest |= {f"recent_square_of_{name}": ranges[name] ** 2 for name in ("angle", "rate")}
     if ranges.get("run_of_folder", 0.0) >= FEWEST_BEFORE:
         largest["run"] = ranges["run_of_folder"]
     return largest | {name: ranges["angle"] for name in ("recent_angle", "recent_largest_angle")}
@@ -208,7 +212,10 @@ def _laws(
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
     of_baseline = ("k1_N", "k3_N") if base in OF_ELASTIC else ()
     smooth = ", smooth" if base == "smooth" else ""
-    for label, coefficients, numbers in shapes(name, wealth(base, variable)):
+    drawn = [*shapes(name, wealth(base, variable))]
+    if (base, variable) == ("odd", "angle"):
+        drawn.append(wave(name, CYCLES))
+    for label, coefficients, numbers in drawn:
         first: FrameVariant | None = None
         for carried, reach, words in remembered_since(variable, largest):
             own = fixed | numbers | {"reach": reach, "coefficients": coefficients}

@@ -1,0 +1,122 @@
+"""Shapes of a strip's terms without a formula: what they are over one variable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from ufl import exp
+
+from ....inputs.parameters import Parameter
+from ....mechanics.laws.shaped import shape_of
+from ...inference.effects import Values
+
+__all__ = [
+    "HEAVIEST",
+    "LARGEST",
+    "SPLINES",
+    "Drawn",
+    "Of",
+    "along_the_strip",
+    "coefficient",
+    "over_runs",
+    "splines",
+    "wave",
+]
+
+#: Numbers of coefficients of a spline.
+SPLINES = (1, 2)
+#: Where a step, or a bump, may begin to be looked for, as a share of the longest strip.
+STEPS, BUMPS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
+#: How wide they are.
+WIDTH, BUMP_WIDTHS = 0.03, (0.03, 0.1)
+#: Decays from the clamp or from the free end, as shares of it.
+DECAYS = (0.05, 0.2)
+#: Over how many runs something settles, as a share of them.
+FADING = (0.3, 1.0)
+#: No coefficient is larger: a moment or a weight that is so many times another is none. But a
+#: bead at the end of a strip, whose weight is all in little of it, is.
+LARGEST, HEAVIEST = 10.0, 100.0
+#: Most waves along a strip or across a picture that are looked for, and their step.
+WAVES, STEP = 8.0, 0.5
+
+Of = Callable[[Values, Any], Any]
+"""An expression of the values of parameters and of a variable."""
+
+Drawn = tuple[str, tuple[Parameter, ...], Of]
+"""A shape over one variable: label, parameters, and the expression."""
+
+
+def splines(name: str, counts: Iterable[int], *, constant: bool = False) -> Iterator[Drawn]:
+    """Splines that are 0 at 0, or with a constant of their own."""
+    zero = (coefficient(f"{name}_0"),) if constant else ()
+    for count in counts:
+        own = tuple(coefficient(f"{name}_{k + 1}") for k in range(count))
+
+        def spline(p: Values, x: Any, own: Any = own) -> Any:
+            return sum(p[c.name] for c in zero) + _shape("spline", p, own, None, None, x)
+
+        yield f"{count} coefficients" if count > 1 else "linear", (*zero, *own), spline
+
+
+def along_the_strip(
+    name: str, end: str, *, constant: bool = False, most: float = LARGEST
+) -> Iterator[Drawn]:
+    """Shapes over a place that is counted from one end."""
+    yield from splines(name, SPLINES if end == "clamp" else SPLINES[:1], constant=constant)
+    one = coefficient(f"{name}_1")
+    decay = Parameter(f"{name}_width", DECAYS, 0.02, 1.0)
+    much = replace(one, lower=-LARGEST, upper=most) if end != "clamp" else one
+    yield "decay", (much, decay), lambda p, x: p[one.name] * exp(-x / p[decay.name])
+    if end != "clamp":
+        # Nothing much bends there: a place of its own would hardly be known.
+        return
+    place = Parameter(f"{name}_place", STEPS, 0.0, 1.0)
+    width = Parameter(f"{name}_width", (WIDTH,), 0.01, 0.3)
+    yield (
+        "step",
+        (one, place, width),
+        lambda p, x: _shape("step", p, (one,), p[place.name], p[width.name], x),
+    )
+    about = Parameter(f"{name}_place", BUMPS, 0.0, 1.0)
+    wide = Parameter(f"{name}_width", BUMP_WIDTHS, 0.02, 0.4)
+    yield (
+        "bump",
+        (one, about, wide),
+        lambda p, x: p[one.name] * exp(-(((x - p[about.name]) / p[wide.name]) ** 2)),
+    )
+
+
+def wave(name: str) -> Drawn:
+    """A wave with a zero of its own."""
+    zero, sine, cosine = (coefficient(f"{name}_{of}") for of in ("0", "sine", "cosine"))
+    periods = tuple((1.0 / np.arange(WAVES, 0.9, -STEP)).tolist())
+    period = Parameter(f"{name}_period", periods, 0.5 / WAVES, 2.0)
+
+    def around(p: Values, x: Any) -> Any:
+        return p[zero.name] + _shape("periodic", p, (sine, cosine), None, p[period.name], x)
+
+    return "periodic", (zero, sine, cosine, period), around
+
+
+def coefficient(name: str) -> Parameter:
+    """One within bounds."""
+    return Parameter(name, lower=-LARGEST, upper=LARGEST, amplitude=True)
+
+
+def over_runs(name: str, *, constant: bool = False) -> Iterator[Drawn]:
+    """Shapes over the few runs that there are."""
+    yield from splines(name, SPLINES, constant=constant)
+    zero = (coefficient(f"{name}_0"),) if constant else ()
+    one, width = coefficient(f"{name}_1"), Parameter(f"{name}_width", FADING, 0.1, 2.0)
+
+    def saturating(p: Values, x: Any) -> Any:
+        return sum(p[c.name] for c in zero) + p[one.name] * (1 - exp(-x / p[width.name]))
+
+    yield "saturation", (*zero, one, width), saturating
+
+
+def _shape(kind: str, p: Values, own: Iterable[Parameter], place: Any, width: Any, x: Any) -> Any:
+    return shape_of(kind, tuple(p[c.name] for c in own), x, place, width)
