@@ -387,8 +387,10 @@ def test_the_net_and_the_single_crossing_have_the_same_force(law):
         {"base": "rest", "constant": 0.02},
         {"base": "odd", "variable": "angle", "shape": "periodic", "width": 0.3},
         {"base": "elastic", "variable": "recent_square_of_angle", "reach": 0.3, "memory_s": 20.0},
+        {"base": "outward", "variable": "rate", "reach": 0.1},
+        {"base": "forward", "variable": "rate", "reach": 0.1},
     ],
-    ids=["state of rest", "wave", "mean square"],
+    ids=["state of rest", "wave", "mean square", "way out", "way on"],
 )
 def test_other_factors_are_the_same_in_both(numbers):
     compare_net_and_crossing(sample("shaped") | numbers)

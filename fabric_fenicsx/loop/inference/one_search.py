@@ -174,6 +174,8 @@ class Search:
             fewer = self.models.with_these_variances(levels[-1][0])
             levels.append(self._together(count, fewer))
             self._with_one_less(levels)
+            if self._screened_first and levels[-1]:
+                self._with_another(levels, fewer)
             # With an effect of which nothing is left it is a model of fewer, which is among those.
             levels[-1] = [m for m in levels[-1] if not nothing_left(m.fit)]
         return candidates, [level for level in levels if level]
@@ -290,6 +292,26 @@ class Search:
         tried = {m.fit.variants for m in levels[-2]}
         new = [f for f in found if f.variants not in tried]
         levels[-2] = self.models.best_refined([*levels[-2], *self.models.weighed(new)])
+
+    def _with_another(self, levels: list[list[Model]], tried: Fit) -> None:
+        """The best model of the last level with each of its effects replaced by any other.
+
+        What was added to the best model of one effect less stands for what that one has wrong.
+        """
+        best = levels[-1][0]
+        if self.judge.settled(best, levels[0][0]):
+            return
+        own = [set(best.fit.variants) - {out} for out in best.fit.variants]
+        found: list[Fit] = []
+        for model in levels[-2]:
+            kept = set(model.fit.variants)
+            if kept in own and kept != set(tried.variants):
+                own.remove(kept)
+                base = self.models.with_these_variances(model)
+                more = self._added_to(base)
+                found += self.models.fitted(more, starts=1, base=base, most=CRITERIA.terms)
+        if found:
+            levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
 
     # Choice -------------------------------------------------------------------------------
 

@@ -40,6 +40,8 @@ Base = Literal[
     "even",
     "odd_in_rate",
     "even_in_rate",
+    "outward",
+    "forward",
 ]
 
 
@@ -207,9 +209,10 @@ class ShapedLaw(CrossingLaw):
     Attributes:
         base: of what it is a factor: "elastic" k₁ γ + k₃ γ³, "viscous" γ̇, "dissipative" a friction
             of limit 1 with a stick, "smooth" Dahl's of limit 1, "odd" sign γ, "even" 1,
-            "odd_in_rate" sign γ̇, "even_in_rate" 1. Of "rest" it is no factor but an angle, to
-            which the spring has moved its state of rest: with e the elastic moment and s the sign
-            of γ where it was largest so far, M = e(γ − s (c₀ + f)) − e(γ), as of a permanent set.
+            "odd_in_rate" sign γ̇, "even_in_rate" 1, "outward" sign γ while |γ| grows, "forward" 1
+            while γ grows. Of "rest" it is no factor but an angle, to which the spring has moved its
+            state of rest: with e the elastic moment and s the sign of γ where it was largest so
+            far, M = e(γ − s (c₀ + f)) − e(γ), as of a permanent set.
         variable: v, see VARIABLES.
         reach: v_max [rad, rad/s or s].
         coefficients: of f: [-] of the elastic base, [rad] of an angle of rest, [N mm s] of the
@@ -342,4 +345,9 @@ class ShapedLaw(CrossingLaw):
             return signed(at.gamma, 1.0)
         if self.base == "odd_in_rate":
             return signed(at.rate, 1.0)
+        if self.base == "outward":
+            grows = gt(at.size, size_of(at.gamma_n))
+            return conditional(grows, signed(at.gamma, 1.0), 0.0)
+        if self.base == "forward":
+            return conditional(gt(at.change, 0), 1.0, 0.0)
         return 1.0

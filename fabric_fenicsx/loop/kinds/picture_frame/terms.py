@@ -84,13 +84,15 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
         "even": ("angle",),
         "odd_in_rate": ("rate",),
         "even_in_rate": ("rate",),
+        "outward": ("rate",),
     }
-    also = {"viscous": ("rate",), "dissipative": ("direction",)}
+    also = {"viscous": ("rate",), "dissipative": ("direction",), "outward": ("direction",)}
     for base, variables in bases.items():
         for by, own in as_reported(variables).items():
             name = f"{base}_moment_of_{by}"
-            alike = ("dissipative", "smooth") if base == "dissipative" else (base,)
-            forms = [f for b in alike for v in own for f in _laws(name, b, v, largest)]
+            forms = [
+                f for b in ALIKE.get(base, (base,)) for v in own for f in _laws(name, b, v, largest)
+            ]
             depends_on, words = (by, *also.get(base, ())), base.replace("_", " ")
             yield Effect(
                 name,
@@ -174,8 +176,14 @@ def of_the_run(
     )
 
 
-ABOUT = {"rest": "state of rest of the elastic moment"}
-"""What a base is called where it is no moment."""
+ALIKE = {"dissipative": ("dissipative", "smooth"), "outward": ("outward", "forward")}
+"""Bases of one term: frictions, and ways by |γ| or by γ."""
+
+ABOUT = {
+    "rest": "state of rest of the elastic moment",
+    "outward": "moment on the way out alone",
+}
+"""What a base is called where its name does not do."""
 
 
 CALLED = {"unloading": "direction", "relative_angle": "largest_angle"}
@@ -208,10 +216,10 @@ def _laws(
     """Forms of a factor of a moment."""
     fixed: dict[str, Any] = {"base": base, "variable": variable}
     fixed |= remembering(name, base, variable, largest)
-    if base in FRICTION:
+    if base in (*FRICTION, *ALIKE["outward"]):
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
     of_baseline = ("k1_N", "k3_N") if base in OF_ELASTIC else ()
-    smooth = ", smooth" if base == "smooth" else ""
+    also = f", {base}" if base in ("smooth", "forward") else ""
     drawn = [*shapes(name, wealth(base, variable))]
     if (base, variable) == ("odd", "angle"):
         drawn.append(wave(name, CYCLES))
@@ -221,7 +229,7 @@ def _laws(
             own = fixed | numbers | {"reach": reach, "coefficients": coefficients}
             value = partial(factor, own)
             form = FrameVariant(
-                f"{words}, {label}{smooth}",
+                f"{words}, {label}{also}",
                 fitted(own),
                 shape=Shape(X[variable], Y.get(base, "moment_N"), reach, value, own),
                 laws=partial(of_a_law, own),
