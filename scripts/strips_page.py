@@ -479,8 +479,8 @@ forces, each strip solved with its own parameters where a round of the fit ends,
 move by more than {:g} of its standard error, or {:g} where slipping crossings make corners."""
 
 ALONE = """Where these fits end strips are solved once more, forces are corrected, and they are
-fitted again; they do not go on until nothing moves, as those with picture frames below do, and the
-last digits of the table are [not theirs](bias_extension.md#measured-strips)."""
+fitted again; they do not go on until nothing moves, as those with picture frames below do. Models
+of one effect hardly move any more, [those of two may](bias_extension.md#measured-strips)."""
 
 FORETELL = """From the others a strip is foretold to {:.2g} N at best by strips alone and to
 {:.2g} N with the frames' locking, the held-out one to {:.2g} and {:.2g} N."""

@@ -18,8 +18,10 @@ from fabric_fenicsx.loop.kinds.bias_extension.frame_law import (
     locking,
     locking_variant,
 )
+from fabric_fenicsx.loop.kinds.bias_extension.mixture import Travels
 from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension, _backward
 from fabric_fenicsx.loop.kinds.bias_extension.quantities import read_together
+from fabric_fenicsx.loop.kinds.bias_extension.solved import Way
 from fabric_fenicsx.loop.kinds.bias_extension.strip import (
     KNOTS,
     Curve,
@@ -100,6 +102,32 @@ def test_another_law_is_foretold_to_first_order(strip, monkeypatch):
     change = np.abs(exact - before).max()
     assert np.abs(off[1]).max() < 0.03 * change
     assert 2.8 < np.linalg.norm(off[0]) / np.linalg.norm(off[1]) < 5.5
+
+
+def test_what_strips_say_is_evaluated_once_and_the_same(strip, monkeypatch):
+    """Where the crosshead is; a strip that is drawn by less has travels of its own."""
+    (drawn,) = (v for e in strip.effects if e.name == "clamp_slip" for v in e.variants)
+    values = VALUES | {drawn.parameters[0].name: 0.1}
+    asked = []
+    monkeypatch.setattr(Way, "at", lambda *a, at=Way.at, **k: asked.append(a) or at(*a, **k))
+    force, slopes = strip.predict((), values)
+    asked.clear()
+    again, _ = strip.predict((), values)
+    assert not asked and np.array_equal(again, force)
+    less, _ = strip.predict((drawn,), values)
+    assert asked and (less[1:] < force[1:]).all()
+    # Laws get the same arrays again, of which they keep what they made.
+    known, of_drawn = strip._kinematics(strip._points, {}), strip._recorded.travel(drawn, values)
+    strip.predict((), values | {"k1_N": 0.021})
+    assert strip._kinematics(strip._points, {}) is known
+    ends = [of["gamma"].value[-1, -1] for of in (strip._kinematics(of_drawn, values), known)]
+    assert ends[0] < ends[1]
+    anew = Travels(strip._points["D"].value, strip._back)
+    monkeypatch.setattr(strip, "_recorded_travels", anew)
+    strip._of_recorded.cache_clear()
+    found, other_slopes = strip.predict((), values)
+    assert np.array_equal(found, force)
+    assert all(np.array_equal(other_slopes[name], slope) for name, slope in slopes.items())
 
 
 def test_a_dashpot_costs_its_work():
@@ -216,6 +244,17 @@ def test_angles_are_readings_of_their_own():
     specimens = [int(readings.specimen[own][0]) for own in of_run]
     assert specimens[3:] == specimens[:2] and len(set(specimens[:3])) == 3
     assert [int(readings.folder[own][0]) for own in of_run] == [0, 0, 1, 0, 0]
+
+
+def test_slip_begins_where_forces_are_though_none_was_read():
+    """With angles alone at those of the strips that were solved first."""
+    alone = BiasExtension([with_angles(measured(pulled(force=np.full(29, np.nan))))])
+    first = alone.curve
+    path = solved_strip(strip_case(measured(pulled()), pulled(), TRAVEL, 1.0, {}), first)
+    (slip,) = (v for e in alone.effects if e.name == "crossover_slip" for v in e.variants)
+    on_a_tow = path.force[-1] / WIDTH * 5.0
+    assert slip.parameters[0].starts[0] * on_a_tow == pytest.approx(1.0, rel=0.05)
+    assert slip.solved_at[-1] * on_a_tow == pytest.approx(40.0, rel=0.05)
 
 
 def test_a_strip_without_readings_is_refused():

@@ -19,9 +19,14 @@ from test_cli import MPI, contents
 from test_drape_loop import angle, made_up, marks, written
 
 from fabric_fenicsx.__main__ import main
+from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.fabric import NEAREST
+from fabric_fenicsx.loop.inference.judge import Model
+from fabric_fenicsx.loop.inference.models import nothing_left
+from fabric_fenicsx.loop.inference.one_search import Search
 from fabric_fenicsx.loop.kinds.drape import model as drape
 from fabric_fenicsx.loop.kinds.drape.model import Drape
+from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.report.content import SCHEMA
 from fabric_fenicsx.loop.report.words import parameter_unit
 
@@ -146,6 +151,21 @@ def test_the_unexplained_says_what_came_nearest(diagnosed, tmp_path):
     assert report["best"]["effects"] and report["best"]["effects"][0]["name"] in report["headline"]
     assert report["best"]["error_fit"] > 1.5 * report["error"]["noise"]
     assert (tmp_path / "out" / NEAREST).exists()
+
+
+def test_what_is_left_of_nothing_is_in_no_model_of_several(tmp_path, monkeypatch):
+    """An effect whose amplitude ends at nothing beside others: the model is that of the others."""
+    RECIPES["unlisted-wrinkles"](tmp_path / "set")
+    test = PictureFrame([read_measurement(tmp_path / "set")])
+    names = ("crosshead_backlash", "crossover_friction")
+    search = Search(test, [e for e in test.effects if e.name in names], lambda done, what: None)
+    found, fitted = list[Model](), search._together
+    monkeypatch.setattr(search, "_together", lambda *of: found.extend(fitted(*of)) or list(found))
+    _, levels = search._looked_through()
+    gone = [nothing_left(model.fit) for model in found]
+    assert any(gone) and not all(gone)
+    pairs = levels[2]
+    assert pairs and not any(nothing_left(model.fit) for model in pairs)
 
 
 class Images(HTMLParser):

@@ -237,6 +237,21 @@ def test_the_headline_says_what_folders_foretell_of_each_other():
     assert said.endswith("one within 24 % (expected 20 %) and two not at all.")
 
 
+def test_the_headline_claims_no_more_than_readings_know_of_a_term():
+    """Rivals are named once each; of one way at one speed only the curve is known."""
+    rivals = [{"acts_on": "moment", "depends_on": [name]} for name in ("path", "path", "time")]
+    term = {"name": "discovered_1", "acts_on": "moment", "depends_on": ["rate", "direction"]}
+    term |= {"rivals": [{"name": "crossover_friction"}, *rivals], "one_curve": False}
+    found = REPORT | {"verdict": "effect_discovered", "discovered": [term]}
+    said = headline(found)
+    assert "depends on the rate and direction (discovered_1) does" in said
+    assert said.count("by path") == 1 and "crossover_friction, the moment by path or" in said
+    said = headline(found | {"discovered": [term | {"one_curve": True}]})
+    assert "depends on the" not in said and "acts on the moment (discovered_1) does" in said
+    assert "not on which of rate, direction, path and time it depends" in said
+    assert "It may be crossover_friction in a form" in said
+
+
 def test_the_headline_says_what_noise_is():
     noise = REPORT["noise_model"] | {"stated": 0.02, "words": "correlated"}
     noise |= {"other_than_stated": True, "other_than_white": True}

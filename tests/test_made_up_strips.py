@@ -81,6 +81,17 @@ def test_what_is_not_of_the_law_is_there(case, tmp_path):
     assert slipped["force_N"].to_numpy() == pytest.approx(less["force_N"].to_numpy(), abs=5e-3)
 
 
+def test_a_slip_that_is_put_in_is_seen_in_the_forces(case, tmp_path):
+    """At a limit that the strip's own forces come to, though none has been read."""
+    one = ["--lengths", 50, "--rates", 60, "--readings", 46]
+    _, (plain,) = made(case, tmp_path / "plain", *one)
+    _, (slipped,) = made(case, tmp_path / "slip", *one, "--effect", "crossover_slip", noise=0.004)
+    share = slipped["force_N"].max() / plain["force_N"].max()
+    assert 0.3 < share < 0.95
+    off = (plain["force_N"] - slipped["force_N"]).to_numpy()
+    assert np.sqrt(np.mean(off**2)) > 5.0 * 0.004
+
+
 def test_laws_of_ones_own_are_a_strip_s_as_well(tmp_path):
     own = read_effects(DEMOS / "own_effects.py")
     (frame,) = [effect for effect in own if effect.name == "stitch_tightening"]

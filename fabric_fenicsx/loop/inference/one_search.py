@@ -21,7 +21,7 @@ from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitting import Fit, fit
 from .judge import Model
-from .models import Models
+from .models import Models, nothing_left
 from .noise import quantum
 from .notes import errors_beside, noise_source, notes_of
 from .rivals import pairs_of, rivals_of
@@ -176,6 +176,8 @@ class Search:
             self._with_one_less(levels)
             if self._screened_first and levels[-1]:
                 self._with_another(levels, fewer)
+            # With an effect of which nothing is left it is a model of fewer, which is among those.
+            levels[-1] = [m for m in levels[-1] if not nothing_left(m.fit)]
         return candidates, [level for level in levels if level]
 
     def _alone(self) -> tuple[list[Candidate], list[list[Model]]]:

@@ -268,6 +268,7 @@ def discovered_report(d: Diagnosis, terms: Sequence[Discovered]) -> list[dict[st
                 "meaning": term.effect.meaning,
                 "of": term.effect.name,
                 "rival_names": list(d.rivals.get(term.effect.name, [])),
+                "one_curve": term.effect.name in d.experiment.alike,
             }
         )
     return reported

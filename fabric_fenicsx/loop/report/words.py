@@ -122,26 +122,42 @@ def _verdict(report: Mapping[str, Any]) -> str:
 
 def _discovered(report: Mapping[str, Any], before: str, after: str, scatter: str) -> str:
     terms = report["discovered"]
-    found = [
-        f"something that acts on the {term['acts_on'].replace('_', ' ')} and depends on the "
-        f"{_listed([v.replace('_', ' ') for v in term['depends_on']])} ({term['name']})"
-        for term in terms
-    ]
+    found = []
+    for term in terms:
+        depends = f" and depends on the {_variables(term)}" if not term["one_curve"] else ""
+        found.append(f"something that acts on the {_acts_on(term)}{depends} ({term['name']})")
     names = [effect["name"] for effect in report["beside"]]
     beside = f", beside {_listed(names)}, which may be part of it" if names else ""
     text = (
         f"No known effect explains the residual; {_listed(found)} does{beside}: held-out error "
         f"{before} before, {after} after{_foreseen(report)}; {scatter}."
     )
-    for term in (term for term in terms if term["rivals"]):
-        others = [
-            r["name"]
-            if "name" in r
-            else f"the {r['acts_on'].replace('_', ' ')} by {_listed(r['depends_on'])}"
-            for r in term["rivals"]
-        ]
-        text += f" This data cannot tell {term['name']} from {one_of(others)}."
-    return text
+    return text + "".join(_not_told(term) for term in terms if term["rivals"])
+
+
+def _not_told(term: Mapping[str, Any]) -> str:
+    """What readings cannot tell a term from, in a sentence."""
+    listed = [r["name"] for r in term["rivals"] if "name" in r]
+    others = [r for r in term["rivals"] if "name" not in r]
+    if not term["one_curve"]:
+        words = [*listed, *(f"the {_acts_on(r)} by {_variables(r)}" for r in others)]
+        return f" This data cannot tell {term['name']} from {one_of(list(dict.fromkeys(words)))}."
+    # Laws of all kinds: a long list would only hide that nothing is known of it.
+    of = [*term["depends_on"], *(name for r in others for name in r["depends_on"])]
+    variables = _listed([v.replace("_", " ") for v in dict.fromkeys(of)])
+    known = f" It may be {one_of(listed)} in a form that was not tried." if listed else ""
+    return (
+        f" The readings go one way at one speed: they know the curve of that {_acts_on(term)}, and "
+        f"not on which of {variables} it depends.{known}"
+    )
+
+
+def _acts_on(term: Mapping[str, Any]) -> str:
+    return str(term["acts_on"]).replace("_", " ")
+
+
+def _variables(term: Mapping[str, Any]) -> str:
+    return _listed([v.replace("_", " ") for v in term["depends_on"]])
 
 
 def _foreseen(report: Mapping[str, Any]) -> str:

@@ -26,8 +26,9 @@ import numpy.typing as npt
 from ...inference.effects import Variant
 from ...inference.experiment import NO_DEVIATIONS, Deviations
 from .effects import StripPullVariant
+from .mixture import Part, number
 from .model import BiasExtension, solved_by
-from .solved import Part, Solved, Wanted, Way, number
+from .solved import Solved, Wanted, Way
 
 __all__ = ["CentredBiasExtension"]
 

@@ -25,7 +25,7 @@ from ..picture_frame.variant import FrameVariant
 from . import BiasExtensionRig
 from .model import BiasExtension
 from .quantities import ANGLE
-from .strip import pulled
+from .strip import KNOTS, Curve, pulled
 
 __all__ = ["made_up"]
 
@@ -87,8 +87,10 @@ def made_up(
     rig = BiasExtensionRig(bias_deg=case.bias_deg)
     fabric = fabric_keys(case.tow, case.warp_spacing_mm, case.weft_spacing_mm)
     measurement = Measurement(Path(), case.test, case.title, fabric, rig, noise, tuple(runs))
-    experiment = BiasExtension([measurement], own)
-    law = case.crossover
+    law, gamma = case.crossover, np.radians(KNOTS)
+    moments = law.k1_N_mm * gamma + law.k3_N_mm * gamma**3
+    curve = Curve.through(moments, law.dashpot_N_s_mm)
+    experiment = BiasExtension([measurement], own, first=curve)
 
     def solved(forms: Sequence[Variant], values: Mapping[str, float]) -> list[dict[str, Array]]:
         mine = [v for v in forms if isinstance(v, FrameVariant)]

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -37,9 +37,10 @@ from ..picture_frame.variant import FrameVariant
 from ..records import shifted
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
+from .mixture import Part, Travels, gamma_of, number, of_ways
 from .quantities import first_curve, read_together, strip_of
 from .settled import Correction, Quantity, correction
-from .solved import GROUPS, Part, Solved, SolvedStrips, Wanted, gamma_of, number, of_ways, reached
+from .solved import GROUPS, Solved, SolvedStrips, Wanted, reached
 from .strip import FINE_STEPS, KNOTS, Curve, strip_case
 from .terms import strip_terms
 
@@ -58,12 +59,22 @@ DASHPOT = "c1_N_s"
 GONE_BACK = 0.02
 #: Share by which a curve, a slip or a crimp may differ from those that a fit was solved with.
 SETTLED = 0.02
+#: Sets of strips of which it is kept how their crossings go.
+MOTIONS = 8
 #: Least work of moments, over that of the first curve, that strips slip at.
 LEAST_SIZE = 1e-6
 
 
 class BiasExtension(CrossheadTest):
-    """Bias extension of one fabric; see CrossheadTest."""
+    """Bias extension of one fabric; see CrossheadTest.
+
+    Args:
+        measurements: folders of this test.
+        own: effects of the user's.
+        like: other strips, whose solves serve these too.
+        first: curve that strips are first solved with; by default the last one of ``like``, or what
+            the readings suggest.
+    """
 
     test = "bias_extension"
     listed = BIAS_EXTENSION_EFFECTS
@@ -77,7 +88,9 @@ class BiasExtension(CrossheadTest):
         measurements: Sequence[Measurement],
         own: Sequence[Effect] = (),
         like: BiasExtension | None = None,
+        first: Curve | None = None,
     ) -> None:
+        self._first = first
         self._corrections: dict[frozenset[Variant], Correction] = {}
         self._settled: dict[frozenset[Variant], tuple[Solved, dict[str, Any]]] = {}
         self._like = like
@@ -175,6 +188,13 @@ class BiasExtension(CrossheadTest):
         gone = np.max(np.where(self._back, self._furthest - D, 0.0), axis=0)
         back = np.array([gone[own].max() for own in same]) > GONE_BACK * self._furthest
         self._back &= back
+        self._recorded_travels = Travels(D, self._back, kept=True)
+
+        def going(solved: Solved) -> dict[str, Varying]:
+            parts = [Part(solved, number(1.0))]
+            return self._going(parts, self._points["D"], self._points["D_rate"])
+
+        self._of_recorded = lru_cache(maxsize=MOTIONS)(going)
         for (m, run), travel, pace in zip(runs, self._furthest, self._speed, strict=True):
             strip_case(m, run, float(travel), float(pace), {})
         # Of the curve that laws with memory and dashpots follow, the same throughout.
@@ -187,11 +207,17 @@ class BiasExtension(CrossheadTest):
         like = self._like
         paths = {} if like is None else like._strips.paths
         self._strips: SolvedStrips = SolvedStrips(runs, self._furthest, self._speed, back, paths)
-        suggested = first_curve(self._of_forces()) if like is None else like.curve
+        suggested = self._first
+        if suggested is None:
+            suggested = first_curve(self._of_forces()) if like is None else like.curve
         first = self._strips.solved({}, suggested)
         self._top = max(
             float(way.gamma(D).max()) for way, D in zip(first.ways, self._furthest, strict=True)
         )
+        self._first_forces = [
+            float(way.force(np.array([D]), np.array([False]), first.curve)[0])
+            for way, D in zip(first.ways, self._furthest, strict=True)
+        ]
         self._mixture = [Part(first, number(1.0))]
         self._reached = reached(first, self._furthest)
         self._reached /= float(self._reached @ first.curve.moments)
@@ -215,14 +241,20 @@ class BiasExtension(CrossheadTest):
         ]
 
     def _more_shares(self) -> dict[str, float]:
-        """One over the largest force on a tow of the clamps [1/N], and per width of them [mm/N]."""
-        found = {"per_tow_force": 1e9, "per_width_force": 1e9}
-        for m, run in self._of_forces():
-            per_width = max(float(np.abs(run.columns["force_N"]).max()) / run.own["width_mm"], 1e-9)
-            per_tow = per_width * m.fabric.tow_spacing_mm
-            found["per_tow_force"] = min(found["per_tow_force"], 1.0 / per_tow)
-            found["per_width_force"] = min(found["per_width_force"], 1.0 / per_width)
-        return found
+        """One over the largest force on a tow of the clamps [1/N], and per width of them [mm/N].
+
+        Where none has been read, of strips that are to be made up or whose angles alone were read,
+        it is that of the strips that were solved first.
+        """
+        forces = [(m, run, np.abs(run.columns["force_N"]).max()) for m, run in self._of_forces()]
+        if not any(force > 0.0 for _, _, force in forces):
+            pairs = zip(self._runs, self._first_forces, strict=True)
+            forces = [(m, run, force) for (m, run), force in pairs]
+        per_width = [float(force) / run.own["width_mm"] for _, run, force in forces]
+        per_tow = [
+            w * m.fabric.tow_spacing_mm for w, (m, _, _) in zip(per_width, forces, strict=True)
+        ]
+        return {"per_tow_force": 1.0 / max(per_tow), "per_width_force": 1.0 / max(per_width)}
 
     def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
         found = super()._scaled(effect, shares)
@@ -388,12 +420,24 @@ class BiasExtension(CrossheadTest):
         points, runs = self._points["D"].value.shape
         return self._recorded.at_readings(values.reshape(points, runs, GROUPS)[:, :, -1])
 
+    def _travels(self, D: Varying) -> Travels:
+        """Travels of a model; most have those of the crossheads."""
+        return self._recorded_travels if D is self._points["D"] else Travels(D.value, self._back)
+
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]
-        area = np.concatenate([way.area for way in self._mixture[0].solved.ways])
-        gamma, first, second = (
-            gamma_of(self._mixture, D.value, self._back, order) for order in range(3)
-        )
+        one, *more = self._mixture
+        recorded = D is self._points["D"] and speed is self._points["D_rate"]
+        if recorded and not more and not one.weight.slopes and one.weight.value == 1.0:
+            # The same arrays again: what laws make of them alone is kept; see Marched.
+            return self._of_recorded(one.solved)
+        return self._going(self._mixture, D, speed)
+
+    def _going(self, parts: Sequence[Part], D: Varying, speed: Varying) -> dict[str, Varying]:
+        """How the crossings of solved strips go at some travels; see _kinematics."""
+        area = np.concatenate([way.area for way in parts[0].solved.ways])
+        travels = self._travels(D)
+        gamma, first, second = (gamma_of(parts, travels, order) for order in range(3))
 
         def each(values: Array) -> Array:
             """Of every run, at each of its groups."""
@@ -428,12 +472,12 @@ class BiasExtension(CrossheadTest):
     ) -> Varying:
         self._mixture = self._mixed(variants, values)
         whole = super()._force(travel, variants, values)
-        rest, middle = (
-            of_ways(self._mixture, travel["D"], self._back, name) for name in ("rest", "middle")
-        )
+        D, travels = travel["D"], self._travels(travel["D"])
+        rest = of_ways(self._mixture, travels, D.slopes, "rest")
         found = self._pull = whole + rest + self._correction(variants, travel, "force")
         if not self._angles.any():
             return found
+        middle = of_ways(self._mixture, travels, D.slopes, "middle")
         # Of runs of angles nothing else counts.
         degree = np.asarray(np.degrees(self._together.unit))
         angles = (middle + self._correction(variants, travel, "middle")) * Varying(degree)
@@ -457,7 +501,8 @@ class BiasExtension(CrossheadTest):
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
         """Mean shear angle of the middle zone at every reading [degrees], (n,)."""
         self._mixture = self._mixed(variants, values)
-        middle = of_ways(self._mixture, self._points["D"], self._back, "middle")
+        travels = self._travels(self._points["D"])
+        middle = of_ways(self._mixture, travels, {}, "middle")
         middle += self._correction(variants, self._points, "middle")
         return self._recorded.at_readings(np.degrees(middle.value))
 

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ...expressions.marching import Varying
-from .solved import Part, Solved, gamma_of, of_ways
+from .mixture import Part, Travels, gamma_of, of_ways
+from .solved import Solved
 
 __all__ = ["Correction", "Quantity", "correction"]
 
@@ -66,12 +67,13 @@ def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Corr
     off: dict[str, list[list[PchipInterpolator]]] = {"force": [], "middle": []}
     for flag in (False, True):
         back = np.full(D.shape, flag)
+        travels = Travels(D, back)
         gamma, slope = (
-            gamma_of(foretold, D, back, order).value.reshape(*D.shape, -1) for order in (0, 1)
+            gamma_of(foretold, travels, order).value.reshape(*D.shape, -1) for order in (0, 1)
         )
         rate = slope * (-speed if flag else speed)
         work = np.sum(area * slope * curve.at(gamma, rate, back[:, :, None]), axis=2)
-        force, middle = (of_ways(foretold, Varying(D), back, n).value for n in ("rest", "middle"))
+        force, middle = (of_ways(foretold, travels, {}, n).value for n in ("rest", "middle"))
         of_runs = [(way, D[:, r], back[:, r]) for r, way in enumerate(exact.ways)]
         for name, known, own in (
             ("force", force + work, [way.force(d, b, curve) for way, d, b in of_runs]),

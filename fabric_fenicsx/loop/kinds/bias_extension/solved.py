@@ -9,9 +9,8 @@ where none is near. All that has to be solved for one model is solved at once, i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from operator import attrgetter
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,21 +18,16 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ....errors import SolveError
-from ...expressions.marching import Varying
 from ...measurement.schema import Measurement, Run
 from ...workers import each_of
 from .strip import KNOTS, STEPS, Curve, StripPath, solved_strip, strip_case
 
 __all__ = [
     "GROUPS",
-    "Part",
     "Solved",
     "SolvedStrips",
     "Wanted",
     "Way",
-    "gamma_of",
-    "number",
-    "of_ways",
     "reached",
 ]
 
@@ -101,7 +95,7 @@ class Solved:
         passed: angles of all groups at some travels of all runs, out and back [rad], (n,).
         weight: A dγ/dD there, (n,).
         rate: dγ/dt there [rad/s], (n,).
-        back: whether on the way back, (n,).
+        out: how many of them are on the way out; the others are on the way back.
         work: the weight times the curve's moments, (n,).
     """
 
@@ -110,7 +104,7 @@ class Solved:
     passed: Array
     weight: Array
     rate: Array
-    back: Flags
+    out: int
     work: Array
 
     @classmethod
@@ -123,20 +117,15 @@ class Solved:
             np.concatenate([(by(way) * way.gamma(D, 1)).ravel() for way, D in every])
             for by in (attrgetter("area"), attrgetter("speed"))
         )
-        back = np.arange(len(passed)) >= TRAVELS * GROUPS * len(ways)
-        work = weight * curve.at(passed, rate, back)
-        return cls(curve, tuple(ways), passed, weight, rate, back, work)
+        out = TRAVELS * GROUPS * len(ways)
+        work = weight * _moments(curve, passed, rate, out)
+        return cls(curve, tuple(ways), passed, weight, rate, out, work)
 
     def apart(self, curve: Curve) -> float:
         """By how much of its work a curve differs from the one that strips were solved with."""
-        mine = self.weight * curve.at(self.passed, self.rate, self.back)
+        mine = self.weight * _moments(curve, self.passed, self.rate, self.out)
         total = float(np.abs(mine).sum())
         return float(np.abs(mine - self.work).sum()) / max(total, 1e-300)
-
-
-def number(value: float, slopes: Mapping[str, Any] = MappingProxyType({})) -> Varying:
-    """A number with its derivatives by parameter."""
-    return Varying(np.asarray(value), {p: np.asarray(slope) for p, slope in slopes.items()})
 
 
 class SolvedStrips:
@@ -302,6 +291,8 @@ class SolvedStrips:
             if enough:
                 raise SolveError(self.failed[key])
             return None
+        if enough and len(known) == 1:
+            return known[0]
         apart = [one.apart(curve) for one in known]
         near = enough or curve.idle or min(apart) < NEAR
         return known[int(np.argmin(apart))] if near else None
@@ -336,48 +327,15 @@ class SolvedStrips:
         return self._groups.setdefault(run, _alike(path))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Part:
-    """Solved strips among those of a model: their weight, and how much larger its forces are.
-
-    Attributes:
-        solved: the strips.
-        weight, size: numbers with their derivatives by parameter.
-    """
-
-    solved: Solved
-    weight: Varying
-    size: Varying = field(default_factory=lambda: number(1.0))
-
-
-def gamma_of(parts: Sequence[Part], D: Array, back: Flags, order: int) -> Varying:
-    """Angles of all groups, or derivatives in D (n_points, n_runs), (n_points, n_groups)."""
-    total = number(0.0)
-    for part in parts:
-        ways = part.solved.ways
-        own = np.hstack([w.at("gamma", D[:, r], back[:, r], order) for r, w in enumerate(ways)])
-        total += part.weight * Varying(own)
-    return total
-
-
-def of_ways(parts: Sequence[Part], D: Varying, back: Flags, name: str) -> Varying:
-    """What the ways of strips say, (n_points, n_runs): their rest, or the angle of the middle.
-
-    The first goes with the size of the forces.
-    """
-    total = number(0.0)
-    for part in parts:
-        value, change = (
-            np.stack(
-                [w.at(name, D.value[:, r], back[:, r], k) for r, w in enumerate(part.solved.ways)],
-                axis=1,
-            )
-            for k in (0, 1)
-        )
-        own = Varying(value, {p: change * slope for p, slope in D.slopes.items()})
-        weight = part.weight * part.size if name == "rest" else part.weight
-        total += weight * own
-    return total
+def _moments(curve: Curve, gamma: Array, rate: Array, out: int) -> Array:
+    """Of a curve at angles, so many on the way out and the others on the way back, (n,)."""
+    way_out, way_back = slice(out), slice(out, None)
+    return np.concatenate(
+        [
+            curve(gamma[way_out], rate[way_out]),
+            (curve.back or curve)(gamma[way_back], rate[way_back]),
+        ]
+    )
 
 
 def reached(solved: Solved, furthest: Array) -> Array:
