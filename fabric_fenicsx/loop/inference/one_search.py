@@ -161,7 +161,7 @@ class Search:
             most = self.most or CRITERIA.most_terms
         for count in range(2, 1 + min(most, len(self.effects))):
             best = _nearest(levels)
-            if not levels[-1] or self.judge.settled(best, levels[0][0]):
+            if not levels[-1] or self._settled(best, levels[0][0]):
                 break
             if count == 2:
                 self.gave_way = self.gives_way()
@@ -205,14 +205,18 @@ class Search:
         singles = self.models.weighed(found) + self.models.weighed(alike)
         levels.append(self.models.best_refined(singles))
         best = _nearest(levels)
-        settled = self.judge.settled(best, levels[0][0]) and not self.judge.doubtful_noise(best)
-        if self._of_two and not settled:
+        if self._of_two and not self._settled(best, levels[0][0]):
             of_two = self._over_two_variables(candidates)
             levels[1] = sorted([*levels[1], *of_two], key=lambda m: m.criterion)
         for candidate in candidates:
             mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
             candidate.fit = mine[0].fit if mine else None
         return candidates, levels
+
+    def _settled(self, model: Model, baseline: Model) -> bool:
+        """Whether nothing more is looked for: of terms only where their noise is not in doubt."""
+        doubtful = self._screened_first and self.judge.doubtful_noise(model)
+        return self.judge.settled(model, baseline) and not doubtful
 
     def _over_two_variables(self, candidates: list[Candidate]) -> list[Model]:
         """Models of the most promising terms over two variables, which join the candidates."""
@@ -321,7 +325,9 @@ class Search:
             more = [m.criterion for other in levels[count + 1 :] for m in other]
             beaten = min(more, default=float("inf")) < level[0].criterion - CRITERIA.decisive
             # What is left may be due to the form of an effect rather than to another one.
-            if beaten and not (count and self.judge.enough(level[0], levels[0][0])):
+            doubtful = self._screened_first and self.judge.doubtful_noise(level[0])
+            enough = count and not doubtful and self.judge.enough(level[0], levels[0][0])
+            if beaten and not enough:
                 continue
             model = level[0]
             fewer = levels[count - 1][0] if count else None
