@@ -11,6 +11,7 @@ from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.noise import Noise
+from fabric_fenicsx.loop.inference.one_search import Search
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.variances import Variances
 
@@ -148,3 +149,18 @@ def test_a_form_at_the_edge_may_stand_for_another_law(bound, rivals):
     at_the_edge = [name for name in said.final.at_bound if name == "bend_more"]
     assert [e.name for e in said.effects] == ["bend"] and bool(at_the_edge) is bool(rivals)
     assert said.rivals["bend"] == rivals
+
+
+@pytest.mark.parametrize(
+    ("acts_on", "correlation", "settled"),
+    [("", 0.3, True), ("", 0.9, True), ("moment", 0.3, True), ("moment", 0.7, False)],
+)
+def test_terms_beside_slow_noise_are_not_the_end_of_the_search(acts_on, correlation, settled):
+    """An effect with a name may be, since terms are then tried beside it."""
+    judge, model = judged(acts_on, stated=None)
+    test = judge.experiment
+    search = Search(test, test.effects, lambda done, what: None)
+    variances = replace(model.estimate.variances, noise=Noise(SIGMA, correlation=correlation))
+    slow = replace(model, estimate=replace(model.estimate, variances=variances))
+    without = fit(test, (), {"a": 2.0, "b": 1.0}, test.readings.fit, Variances(Noise(SIGMA)))
+    assert search._settled(slow, judge.weighed(without, ())) is settled
