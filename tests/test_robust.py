@@ -146,7 +146,7 @@ def small_disk(tmp_path):
     if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
         pytest.skip("no disk can be mounted here")
     yield disk
-    subprocess.run(["umount", disk], check=True)
+    subprocess.run(["umount", "--lazy", disk], check=True)  # something may end late
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
@@ -178,7 +178,7 @@ def read_only(tmp_path):
 
     disk.joinpath("measured").mkdir()
     yield disk, lock
-    subprocess.run(["umount", disk], check=True)
+    subprocess.run(["umount", "--lazy", disk], check=True)  # something may end late
 
 
 def test_input_that_can_only_be_read(read_only, tmp_path, monkeypatch, capsys):
