@@ -202,15 +202,9 @@ def parted(steps: Steps, changing: Collection[str]) -> tuple[Steps, Steps]:
     for k, (operator, operands) in enumerate(steps.operations):
         if depends[k] and operator != "given":
             wanted |= dict.fromkeys(i for i in operands if not depends[i])
-    place = {k: i for i, k in enumerate(wanted)}
-    operations: list[tuple[str, Any]] = [("given", str(i)) for i in range(len(place))]
-    for k, (operator, operands) in enumerate(steps.operations):
-        if depends[k]:
-            place[k] = len(operations)
-            taken = operands if operator == "given" else [place[i] for i in operands]
-            operations.append((operator, taken))
-    still = _needed(Steps(steps.operations, list(wanted)))
-    return still, Steps(operations, [place[k] for k in steps.results])
+    place = {k: str(i) for i, k in enumerate(wanted)}
+    others = [("given", place[k]) if k in place else one for k, one in enumerate(steps.operations)]
+    return _needed(Steps(steps.operations, list(wanted))), _needed(Steps(others, steps.results))
 
 
 def _needed(steps: Steps) -> Steps:

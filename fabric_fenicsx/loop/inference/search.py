@@ -59,8 +59,7 @@ def diagnose_test(
     own = [effect.name for effect in found.effects]
     alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
     in_its_way = experiment.each_its_own_way and search.specimens_differ
-    rivals = experiment.terms_are_rivals or in_its_way or _at_the_edge(found)
-    rivals = bool(own) and rivals
+    rivals = bool(own) and (experiment.terms_are_rivals or in_its_way or _at_the_edge(found))
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
         least = -CRITERIA.decisive

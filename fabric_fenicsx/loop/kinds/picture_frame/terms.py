@@ -181,7 +181,7 @@ ALIKE = {"dissipative": ("dissipative", "smooth"), "outward": ("outward", "forwa
 
 ABOUT = {
     "rest": "state of rest of the elastic moment",
-    "outward": "moment on the way out alone",
+    "outward": "moment on one way alone",
 }
 """What a base is called where its name does not do."""
 
