@@ -100,7 +100,7 @@ class Criteria:
     usual_share: float = 0.05
     stated_within: float = 0.15
     slow_noise: float = 0.8
-    slow_beside: float = 0.5
+    slow_beside: float = 0.15
     readings_per_knot: int = 8
     most_knots: int = 20
     blocks: int = 5

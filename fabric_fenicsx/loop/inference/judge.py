@@ -187,7 +187,9 @@ class Judge:
 
     def cost(self, model: Fit, effects: tuple[Effect, ...]) -> float:
         """What a model pays for its parameters and for the number of its kind."""
-        free = len(model.values) - len(model.at_bound)
+        # What is nothing costs nothing; a place or a time at the end of its range was looked for.
+        sought = {p.name for variant in model.variants for p in variant.shapes}
+        free = len(model.values) - len(set(model.at_bound) - sought)
         forms = sum(log(max(len(effect.variants), 1)) for effect in effects)
         sets = log(max(comb(len(self._effects), len(effects)), 1))
         return free * log(max(int(model.used.sum()), 2)) + 2.0 * (forms + sets)
