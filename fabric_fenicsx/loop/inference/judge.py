@@ -222,7 +222,10 @@ class Judge:
     def doubtful_noise(self, model: Model) -> bool:
         """Whether noise is more than was stated or, where none was, as slow as a misfit."""
         if self.given is None:
-            slow = CRITERIA.slow_beside if model.effects else CRITERIA.slow_noise
+            slow = CRITERIA.slow_noise
+            if model.effects:
+                named = all(effect.listed for effect in model.effects)
+                slow = CRITERIA.slow_named if named else CRITERIA.slow_beside
             return model.estimate.variances.noise.correlation > slow
         return self.misfit(model).reading > CRITERIA.scatter * self.given
 
