@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import LinAlgError, cholesky_banded, solve_banded
+from scipy.linalg.lapack import dgtsv, dpttrf
 
 from ....errors import SolveError
 from ....fabric.section import RectangularSection
@@ -129,7 +129,8 @@ class HangingTow:
         self._cell = np.diff(self.arc)
         density = weight * spacing / (width * height)
         section = RectangularSection(width, height, density, 1.0).stiffness() / spacing
-        self._per_C1 = {"EA": section[0], "GA": section[2]}
+        #: EA and GA.
+        self._per_C1 = section[[0, 2]]
         self.stiffness_per_C1 = float(section[4])
         self.load_per_C1 = weight * length**3 / self.stiffness_per_C1
         self._along = {
@@ -227,9 +228,9 @@ class HangingTow:
             moment = moment + added.value
             rigidity = rigidity + added.slopes.get("kappa", 0.0)
         mean = (angles[1:] + angles[:-1]) / 2.0
-        soft = {name: 1.0 / (C1 * stiff) for name, stiff in self._per_C1.items()}
+        soft = 1.0 / (C1 * self._per_C1)
         beyond = load * _beyond(self._weights)
-        return _Cells(self._cell, mean, beyond, soft["EA"], soft["GA"], kappa, moment, rigidity)
+        return _Cells(self._cell, mean, beyond, soft, kappa, moment, rigidity)
 
     def _balance(self, phi: float) -> _Cells:
         """Come to rest at a turn of the root.
@@ -294,22 +295,23 @@ class HangingTow:
 
     def _slopes(self, at: _Cells) -> dict[str, Array]:
         C1 = self._values["C1_MPa"]
-        softer = -at.shear_and_stretch / C1
         moments = {"C1_MPa": self.stiffness_per_C1 * at.curvature}
         if self._laws.bend:
             for name, slope in self._moments(at.curvature).slopes.items():
                 if name == "B":
                     moments["C1_MPa"] = moments["C1_MPa"] + slope * self.stiffness_per_C1
                 elif name != "kappa":
-                    moments[name] = np.broadcast_to(slope, (CELLS,))
-        beyond = {name: _beyond(weights) for name, weights in self._weight_slopes.items()}
-        zero = np.zeros(CELLS)
-        slopes = {}
-        for name in {**moments, **beyond}:
-            strains = at.by_weight(beyond.get(name, zero))
-            if name == "C1_MPa":
-                strains = strains + softer
-            slopes[name] = at.moved(moments.get(name, zero), strains, beyond.get(name, zero))
+                    moments[name] = slope
+        heavier = {name: _beyond(weights) for name, weights in self._weight_slopes.items()}
+        names = list({**moments, **heavier})
+        moment, beyond = np.zeros((2, len(names), CELLS))
+        strains = np.zeros((2, len(names), CELLS))
+        # It comes first.
+        strains[:, 0] = -at.strains / C1
+        for k, name in enumerate(names):
+            moment[k], beyond[k] = moments.get(name, 0.0), heavier.get(name, 0.0)
+        moved = at.moved(moment, strains, beyond)
+        slopes = {name: moved[:, k] for k, name in enumerate(names)}
         return self._with_turn(slopes, at) if self._laws.slopes else slopes
 
     def _with_turn(self, held: dict[str, Array], at: _Cells) -> dict[str, Array]:
@@ -329,122 +331,114 @@ class HangingTow:
         return slopes
 
 
-@dataclass(frozen=True, slots=True)
 class _Cells:
-    """The cells of a tow at some angles; see the module's docstring, all (n_cells,).
+    """The cells of a tow at some angles; see the module's docstring. All (n_cells,).
 
-    Attributes:
+    Args:
         h: lengths [mm].
         theta: mean angles [rad].
         W: weight beyond, per width [N/mm].
-        stretch, shear: 1/EA and 1/GA, per width [mm/N].
+        soft: 1/EA and 1/GA, per width [mm/N].
         curvature: [1/mm].
         moment: M, per width [N].
         rigidity: dM/dκ [N mm].
+
+    Attributes:
+        N, V: forces [N/mm].
+        strains: Γ1 and Γ2 [-], (2, n_cells).
+        curvature: as given.
     """
 
-    h: Array
-    theta: Array
-    W: Array
-    stretch: float
-    shear: float
-    curvature: Array
-    moment: Array
-    rigidity: Array
-
-    @property
-    def forces(self) -> tuple[Array, Array]:
-        """N and V [N/mm]."""
-        return -self.W * np.sin(self.theta), -self.W * np.cos(self.theta)
-
-    @property
-    def shear_and_stretch(self) -> Array:
-        """Γ1 and Γ2 [-], (2, n_cells)."""
-        N, V = self.forces
-        return np.stack([N * self.stretch, V * self.shear])
+    def __init__(
+        self,
+        h: Array,
+        theta: Array,
+        W: Array,
+        soft: Array,
+        curvature: Array,
+        moment: Array,
+        rigidity: Array,
+    ) -> None:
+        self._h, self._soft = h, soft
+        self._c, self._s = np.cos(theta), np.sin(theta)
+        self.curvature, self._moment = curvature, moment
+        self.N, self.V = -W * self._s, -W * self._c
+        self.strains = np.array([self.N * soft[0], self.V * soft[1]])
+        # What each node of a cell gets of its neighbour's turn, and of its own.
+        by_angle = h / 4.0 * (self.N + (self.V**2 - self.N**2) * (soft[1] - soft[0]))
+        bent = rigidity / h
+        self._beside, own = by_angle - bent, by_angle + bent
+        #: Of K, whose first node is held.
+        self._diagonal = own
+        self._diagonal[:-1] += own[1:]
 
     def residual(self) -> Array:
-        """R of the nodes that are free, (n_cells,)."""
-        (N, V), (gamma1, gamma2) = self.forces, self.shear_and_stretch
-        return self._to_nodes(self.moment, N * gamma2 - V * (1.0 + gamma1))
+        """R of the nodes that are free."""
+        gamma1, gamma2 = self.strains
+        return self._to_nodes(self._moment, self.N * gamma2 - self.V * (1.0 + gamma1))
 
     def _to_nodes(self, moment: Array, c: Array) -> Array:
-        turning = self.h * c / 2.0
-        return moment + turning + np.append((turning - moment)[1:], 0.0)
-
-    def _tangent(self) -> Array:
-        """K with its three diagonals as solve_banded has them; the root's node is held."""
-        N, V = self.forces
-        by_angle = self.h / 4.0 * (N + (V**2 - N**2) * (self.shear - self.stretch))
-        bent = self.rigidity / self.h
-        own, beside = bent + by_angle, by_angle - bent
-        diagonal = own + np.append(own[1:], 0.0)
-        return np.stack([np.append(0.0, beside[1:]), diagonal, np.append(beside[1:], 0.0)])
+        turning = self._h * c / 2.0
+        forces = moment + turning
+        forces[..., :-1] += (turning - moment)[..., 1:]
+        return forces
 
     def solved(self, forces: Array) -> Array:
         """K⁻¹ times what acts on the free nodes; not a number where there is none."""
-        try:
-            return solve_banded((1, 1), self._tangent(), forces, check_finite=False)
-        except LinAlgError:
-            return np.full_like(forces, np.nan)
+        beside = self._beside[1:]
+        *_, found, failed = dgtsv(beside, self._diagonal, beside, forces.T)
+        return np.full_like(forces, np.nan) if failed else found.T
 
     def stable(self) -> bool:
         """Whether the balance is one that a strip rests in: K is positive definite."""
-        try:
-            cholesky_banded(self._tangent()[:2])
-        except (LinAlgError, ValueError):
-            return False
-        return True
+        *_, failed = dpttrf(self._diagonal, self._beside[1:])
+        return not failed
 
     def positions(self) -> Array:
         """X and z of the nodes [mm], (2, n)."""
-        gamma1, gamma2 = self.shear_and_stretch
+        gamma1, gamma2 = self.strains
         return self._summed(self._turned(1.0 + gamma1, gamma2))
 
-    def by_weight(self, beyond: Array) -> Array:
-        """What Γ1 and Γ2 change by when W changes by so much."""
-        return np.stack(
-            [
-                -beyond * np.sin(self.theta) * self.stretch,
-                -beyond * np.cos(self.theta) * self.shear,
-            ]
-        )
+    def by_weight(self, beyond: Array) -> tuple[Array, Array]:
+        """What N and V change by when W changes by so much."""
+        return -beyond * self._s, -beyond * self._c
 
     def moved(self, moment: Array, strains: Array, beyond: Array, turn: float = 0.0) -> Array:
-        """What x and z of the nodes change by, (2, n), with the angles following.
+        """What x and z of the nodes change by, (2, n_changes, n), with the angles following.
 
         Args:
-            moment: what M changes by where the angles stay.
-            strains: likewise Γ1 and Γ2, (2, n_cells).
-            beyond: W.
+            moment: what M changes by where the angles stay, (n_changes, n_cells).
+            strains: likewise Γ1 and Γ2 for other reasons than W, (2, n_changes, n_cells).
+            beyond: W, (n_changes, n_cells).
             turn: change of the root's angle.
         """
-        (N, V), (gamma1, gamma2) = self.forces, self.shear_and_stretch
-        dN, dV = -beyond * np.sin(self.theta), -beyond * np.cos(self.theta)
-        c = dN * gamma2 + N * strains[1] - dV * (1.0 + gamma1) - V * strains[0]
+        gamma1, gamma2 = self.strains
+        dN, dV = self.by_weight(beyond)
+        first, second = strains[0] + dN * self._soft[0], strains[1] + dV * self._soft[1]
+        c = dN * gamma2 + self.N * second - dV * (1.0 + gamma1) - self.V * first
         forces = -self._to_nodes(moment, c)
-        N, V = self.forces
-        by_angle = self.h[0] / 4.0 * (N + (V**2 - N**2) * (self.shear - self.stretch))[0]
-        forces[0] -= turn * (by_angle - self.rigidity[0] / self.h[0])
-        angles = np.append(turn, self.solved(forces))
-        mean = (angles[1:] + angles[:-1]) / 2.0
-        along = strains + mean * np.stack([V * self.stretch, -N * self.shear])
-        rate = self._turned(*along) + mean * self._turned(-gamma2, 1.0 + gamma1)
-        return self._summed(rate)
+        forces[:, 0] -= turn * self._beside[0]
+        angles = np.empty((len(forces), len(self._h) + 1))
+        angles[:, 0], angles[:, 1:] = turn, self.solved(forces)
+        mean = (angles[:, 1:] + angles[:, :-1]) / 2.0
+        along = first + mean * (self.V * self._soft[0] - gamma2)
+        across = second + mean * (1.0 + gamma1 - self.N * self._soft[1])
+        return self._summed(self._turned(along, across))
 
     def by_turn(self) -> Array:
         """Derivative of x and z in the root's angle, (2, n)."""
-        zero = np.zeros_like(self.h)
-        return self.moved(zero, np.zeros((2, len(zero))), zero, 1.0)
+        zero = np.zeros((1, len(self._h)))
+        return self.moved(zero, np.stack([zero, zero]), zero, 1.0)[:, 0]
 
     def _turned(self, along: Array, across: Array) -> Array:
         """X and z of a vector with components along d1 and d3."""
-        c, s = np.cos(self.theta), np.sin(self.theta)
-        return np.stack([c * along - s * across, s * along + c * across])
+        return np.array([self._c * along - self._s * across, self._s * along + self._c * across])
 
     def _summed(self, rate: Array) -> Array:
         """From the clamp on."""
-        return np.concatenate([np.zeros((2, 1)), np.cumsum(self.h * rate, axis=1)], axis=1)
+        found = np.zeros((*rate.shape[:-1], rate.shape[-1] + 1))
+        np.cumsum(self._h * rate, axis=-1, out=found[..., 1:])
+        return found
 
 
 def _beyond(weights: Array) -> Array:
