@@ -411,8 +411,9 @@ def test_moments_on_one_way_alone(base, gamma, before, moment):
         {"base": "outward", "variable": "rate", "reach": 0.1},
         {"base": "forward", "variable": "rate", "reach": 0.1},
         {"base": "flowing", "variable": "angle", "exponent": 3.0, "flow_rate_rad_s": 0.02},
+        {"base": "lagging", "variable": "angle", "memory_s": 20.0, "constant": 0.0},
     ],
-    ids=["state of rest", "wave", "mean square", "way out", "way on", "flow"],
+    ids=["state of rest", "wave", "mean square", "way out", "way on", "flow", "lag"],
 )
 def test_other_factors_are_the_same_in_both(numbers):
     compare_net_and_crossing(sample("shaped") | numbers)

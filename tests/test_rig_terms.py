@@ -366,6 +366,8 @@ def test_variables_that_remember():
     assert stepped(of("recent_force"), {}, force=held) == pytest.approx(2.0 * (1.0 - kept))
     assert stepped(of("force_lag"), {}, force=held) == pytest.approx(-2.0 * kept)
     assert stepped(of("displacement_lag"), {}, displacement=held) == pytest.approx(-2.0 * kept)
+    assert stepped(of("mean_speed"), {}, speed=-held) == pytest.approx(2.0 * (1.0 - kept))
+    assert stepped(of("way"), {}, speed=-held) == pytest.approx(2.0 * np.arange(1, 7))
     to_and_fro = np.array([1.0, -3.0, 2.0, 0.0, 4.0])
     largest = [1.0, 3.0, 3.0, 3.0, 4.0]
     assert stepped(of("largest_force"), {}, force=to_and_fro) == pytest.approx(largest)
@@ -447,6 +449,8 @@ def test_derivatives_of_what_remembers(tmp_path, name):
         ("travel_of_recent_force", "2 coefficients"),
         ("travel_of_largest_force", "step"),
         ("travel_of_displacement_lag", "linear"),
+        ("travel_of_way", "2 coefficients"),
+        ("reading_of_mean_speed", "linear"),
         ("reading_of_force_and_direction", "2 coefficients"),
         ("reading_of_displacement_and_direction", "linear, kept in a hold"),
         ("travel_of_run", "linear"),

@@ -162,6 +162,32 @@ def test_a_flow_at_its_rate_reaches_its_limit():
         assert late == pytest.approx(moment, rel=0.01)
 
 
+@pytest.mark.parametrize("base", ["lagging", "lagging_even"])
+def test_what_lags_is_a_branch_whose_spring_is_not_straight(base):
+    """On a ramp from −0.2 to 0.4 rad, against an integration of dM/dt = dg/dt − M/τ."""
+    law = ShapedLaw(base, "angle", reach=0.5, coefficients=(0.3, 2.0), memory=4.0)
+    step, rate = 0.1, 0.06
+    t = step * np.arange(1, 101)
+    gamma = np.concatenate([[-0.2], -0.2 + rate * t])
+    (before, *moments), _ = marched(law, gamma, step=step)
+
+    def slope(angle):
+        x = abs(angle) / 0.5
+        rise = (0.3 + 4.0 * x) / 0.5
+        return rise if base == "lagging" else rise * np.sign(angle)
+
+    exact = solve_ivp(
+        lambda t, m: slope(-0.2 + rate * t) * rate - m / 4.0,
+        (0.0, t[-1]),
+        [before],
+        t_eval=t,
+        rtol=1e-9,
+        atol=1e-12,
+        max_step=0.05,
+    ).y[0]
+    assert np.abs(moments - exact).max() < 2e-3 * np.abs(exact).max()
+
+
 def test_a_flow_decays_in_a_hold_as_its_power_says():
     """ds/dt = −(r/δ) s⁴ from s₀: s = s₀ (1 + 3 (r/δ) t s₀³)^(−1/3), exactly."""
     law = ShapedLaw("flowing", **FLOWING, **FLOW)

@@ -243,6 +243,7 @@ class CrossheadTest:
             return float(np.abs(values[rows]).max())
 
         D, speed, time = (self._points[name].value for name in ("D", "D_rate", "time"))
+        moved = np.diff(D, axis=0, prepend=D[:1])
         change = np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0, prepend=0.0)
         change[0] = 0.0
         force = float(np.abs(self.readings.observed[rows]).max())
@@ -253,6 +254,7 @@ class CrossheadTest:
             "path": most(self._shown(np.cumsum(np.abs(change), axis=0))),
             "time": most(self._recorded.at_readings(time - time[0])),
             "displacement": most(self._recorded.at_readings(D)),
+            "way": most(self._recorded.at_readings(np.cumsum(np.abs(moved), axis=0))),
             "speed": most(self._recorded.at_readings(speed)),
             "acceleration": most(self._recorded.at_readings(acceleration)),
             "force": force,

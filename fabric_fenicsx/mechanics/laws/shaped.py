@@ -43,6 +43,8 @@ Base = Literal[
     "outward",
     "forward",
     "flowing",
+    "lagging",
+    "lagging_even",
 ]
 
 
@@ -107,6 +109,9 @@ all but the first two remember.
 
 FRICTION = ("dissipative", "smooth", "flowing")
 """Bases that remember how far a stick is bent."""
+
+LAGGING = ("lagging", "lagging_even")
+"""Bases that are forgotten."""
 
 GRADED = (0.05, 0.1, 0.2, 0.4)
 """Knots of a graded spline between its ends."""
@@ -237,7 +242,9 @@ class ShapedLaw(CrossingLaw):
             "odd_in_rate" sign γ̇, "even_in_rate" 1, "outward" sign γ while |γ| grows, "forward" 1
             while γ grows. Of "rest" it is no factor but an angle, to which the spring has moved its
             state of rest: with e the elastic moment and s the sign of γ where it was largest so
-            far, M = e(γ − s (c₀ + f)) − e(γ), as of a permanent set.
+            far, M = e(γ − s (c₀ + f)) − e(γ), as of a permanent set. Of "lagging" it is a moment
+            g = f sign γ, of "lagging_even" g = f, that a fabric takes up and forgets, by the angle:
+            dM/dt = dg/dt − M/τ.
         variable: v, see VARIABLES.
         reach: v_max [rad, rad/s or s].
         coefficients: of f: [-] of the elastic base, [rad] of an angle of rest, [N mm s] of the
@@ -248,14 +255,15 @@ class ShapedLaw(CrossingLaw):
         k1, k3: of the elastic moment [N mm].
         stick_angle: δ, of a friction [rad].
         exponent, flow_rate: n > 1 and r [rad/s], of one that flows.
-        memory: τ of a variable that forgets [s].
+        memory: τ of a variable, or of a moment, that forgets [s].
         also: w, another variable that f depends on, if it does.
         also_reach: w_max [rad or rad/s].
         powers: p; ``coefficients`` has those of f_p for each in turn.
         constants: a_p, in the unit of the coefficients; none are all nothing.
 
     Raises:
-        ValueError: the numbers of coefficients, powers and constants do not go together.
+        ValueError: the numbers of coefficients, powers and constants do not go together, or what
+            lags is not by the angle alone.
     """
 
     base: Base = number("base", "of what it is a factor", Base)
@@ -280,7 +288,9 @@ class ShapedLaw(CrossingLaw):
     law = "shaped"
 
     def __post_init__(self) -> None:
-        """Compare numbers of coefficients."""
+        """Compare numbers of coefficients, and base and variable."""
+        if self.base in LAGGING and (self.variable != "angle" or self.also is not None):
+            raise ValueError(f"base {self.base}: variable {self.variable}, allowed is angle alone")
         if (self.also is None) != (not self.powers):
             raise ValueError("also and powers go together")
         if self.powers and len(self.coefficients) % len(self.powers):
@@ -334,6 +344,8 @@ class ShapedLaw(CrossingLaw):
         if self.base == "rest":
             shifted = at.gamma - self._side(at) * self.factor(at)
             return self._elastic(at, shifted) - self._elastic(at, at.gamma)
+        if self.base in LAGGING:
+            return self._lagging(at)
         return self._base_at(at) * self.factor(at)
 
     def history(self, at: Crossing) -> dict[str, Any]:
@@ -347,7 +359,24 @@ class ShapedLaw(CrossingLaw):
             history |= {"largest": max_value(at.past("largest"), at.size), "side": self._side(at)}
         if self.base in FRICTION:
             history["stick"] = self._base_at(at)
+        if self.base in LAGGING:
+            history["lag"] = self._lagging(at)
         return history
+
+    def _lagging(self, at: Crossing) -> Any:
+        """M, exact where g changes evenly within the step."""
+        memory, reach = at.number(self.memory), at.number(self.reach)
+        place, width = at.number(self.place), at.number(self.width)
+        parts = _each(at, self.coefficients)
+
+        def taken_up(gamma: Any) -> Any:
+            x = min_value(size_of(gamma) / reach, 1)
+            size = shape_of(self.shape, parts, x, place, width)
+            return size if self.base == "lagging_even" else signed(gamma, size)
+
+        kept = _kept(at.per_time, memory)
+        change = taken_up(at.gamma) - taken_up(at.gamma_n)
+        return kept * at.past("lag") + change * memory * at.per_time * (1 - kept)
 
     def _side(self, at: Crossing) -> Any:
         """The sign of γ where it was largest so far."""

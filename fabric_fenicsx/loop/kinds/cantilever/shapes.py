@@ -16,12 +16,14 @@ from ...inference.effects import Values
 __all__ = [
     "HEAVIEST",
     "LARGEST",
+    "SHARPEST",
     "SPLINES",
     "Drawn",
     "Of",
     "along_the_strip",
     "coefficient",
     "over_runs",
+    "places",
     "splines",
     "wave",
 ]
@@ -39,6 +41,8 @@ FADING = (0.3, 1.0)
 #: No coefficient is larger: a moment or a weight that is so many times another is none. But a
 #: bead at the end of a strip, whose weight is all in little of it, is.
 LARGEST, HEAVIEST = 10.0, 100.0
+#: How sharp a step across a picture may be, as of one that was put together of two.
+SHARPEST = 0.002
 #: Most waves along a strip or across a picture that are looked for, and their step.
 WAVES, STEP = 8.0, 0.5
 
@@ -73,8 +77,14 @@ def along_the_strip(
     if end != "clamp":
         # Nothing much bends there: a place of its own would hardly be known.
         return
+    yield from places(name)
+
+
+def places(name: str, sharpest: float = 0.01) -> Iterator[Drawn]:
+    """What is from one place on, no sharper than that share of the range, or at one alone."""
+    one = coefficient(f"{name}_1")
     place = Parameter(f"{name}_place", STEPS, 0.0, 1.0)
-    width = Parameter(f"{name}_width", (WIDTH,), 0.01, 0.3)
+    width = Parameter(f"{name}_width", (WIDTH,), sharpest, 0.3)
     yield (
         "step",
         (one, place, width),

@@ -32,11 +32,13 @@ from .products import products
 from .shapes import (
     HEAVIEST,
     LARGEST,
+    SHARPEST,
     SPLINES,
     Of,
     along_the_strip,
     coefficient,
     over_runs,
+    places,
     splines,
     wave,
 )
@@ -276,6 +278,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     even = coefficient(f"{name}_0")
     forms = [form("even", (even,), lambda p, x: p[even.name], "z", "scale")]
     forms += [form(*shape, "z", "scale") for shape in splines(name, SPLINES)]
+    forms += [form(*shape, "z", "height") for shape in places(name, SHARPEST)]
     yield strip_effect(name, "scale of heights", "reading", ("height",), forms)
 
     name = "reading_of_distance"
@@ -287,6 +290,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     forms += [form(*shape, "x", "scale") for shape in splines(name, SPLINES)]
     forms += [form(*shape, "x", "height") for shape in splines(name, SPLINES[1:])]
     forms.append(form(*wave(name), "x", "height"))
+    forms += [form(*shape, "x", "height") for shape in places(name, SHARPEST)]
     about = "heights, or their scale, by the distance from the clamp"
     yield strip_effect(name, about, "reading", ("distance",), forms)
 

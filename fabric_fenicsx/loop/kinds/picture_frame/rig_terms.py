@@ -71,6 +71,16 @@ RIG_VARIABLES = {
         partial(_itself, "memory"),
         lambda at, past, memory: max_value(past, size_of(at["force"])),
     ),
+    "mean_speed": RigVariable(
+        ("speed", "per_time"),
+        partial(_itself, "memory"),
+        lambda at, past, memory: recent(size_of(at["speed"]), past, at["per_time"], memory),
+    ),
+    "way": RigVariable(
+        ("speed", "per_time"),
+        partial(_itself, "memory"),
+        lambda at, past, memory: past + size_of(at["speed"]) / at["per_time"],
+    ),
     "force_size": RigVariable(("force",), lambda at: size_of(at["force"])),
     "speed_size": RigVariable(("speed",), lambda at: size_of(at["speed"])),
     "force_lag": RigVariable(
@@ -80,7 +90,8 @@ RIG_VARIABLES = {
         ("displacement", "per_time"), partial(_lag, "displacement"), partial(_mean, "displacement")
     ),
 }
-"""By their names; a lag is what the mean over the last τ differs by from what is now."""
+"""By their names; a way is Σ|ΔD|, a mean speed that of its size, and a lag what the mean over the
+last τ differs by from what is now."""
 
 RIG: dict[str, dict[str, tuple[str, ...]]] = {
     "reading": {
@@ -90,6 +101,8 @@ RIG: dict[str, dict[str, tuple[str, ...]]] = {
         "acceleration": ("acceleration",),
         "force_rate": ("force", "rate"),
         "force_lag": ("force", "time"),
+        "mean_speed": ("rate", "time"),
+        "way": ("displacement", "rate"),
         "time": ("time",),
         "run": ("run",),
     },
@@ -99,6 +112,7 @@ RIG: dict[str, dict[str, tuple[str, ...]]] = {
         "force": ("force",),
         "recent_force": ("force", "time"),
         "largest_force": ("force", "direction"),
+        "way": ("displacement", "direction"),
         "time": ("time",),
         "speed": ("direction",),
         "run": ("run",),
@@ -196,7 +210,7 @@ def _forms(
         if own["shape"] == "spline":
             own |= {"ends": between}
         also: dict[str, Any] = {"variable": variable}
-        if "per_time" in RIG_VARIABLES[variable].of:
+        if "per_time" in RIG_VARIABLES[variable].of and variable != "way":
             shares = LAGS if variable.endswith("lag") else ()
             also["memory"] = memory_of(name, largest, *shares)
         if turning:

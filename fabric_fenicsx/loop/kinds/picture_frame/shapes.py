@@ -77,6 +77,8 @@ X = {
     "displacement": "displacement_mm",
     "speed": "speed_mm_s",
     "speed_size": "speed_size_mm_s",
+    "mean_speed": "mean_speed_mm_s",
+    "way": "way_mm",
     "acceleration": "acceleration_mm_s2",
     "force": "force_N",
     "force_size": "force_size_N",
@@ -142,7 +144,7 @@ def wealth(base: str, variable: str) -> int:
         return 1
     if (base, variable) in FINE:
         return 5
-    return 3 if variable in (*FORGETFUL, "recent_force") else 4
+    return 3 if variable in (*FORGETFUL, "recent_force", "mean_speed") else 4
 
 
 def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:

@@ -70,8 +70,13 @@ def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> lis
         ends: of those that may be negative.
     """
     largest = ranges_of(ranges)
-    of_the_crossing = (*_of_the_crossing(largest), *_flowing(largest), *_by_run(largest))
-    return [*of_the_crossing, *rig_terms(largest, ends)]
+    return [
+        *_of_the_crossing(largest),
+        *_flowing(largest),
+        _lagging(largest),
+        *_by_run(largest),
+        *rig_terms(largest, ends),
+    ]
 
 
 def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
@@ -79,6 +84,7 @@ def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
     largest = dict(ranges)
     largest |= {name: ranges["force"] for name in ("recent_force", "largest_force", "force_lag")}
     largest |= {"displacement_lag": ranges["displacement"]}
+    largest |= {"mean_speed": ranges["speed"]}
     largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
     largest["relative_angle"] = 1.0
     largest |= {f"recent_square_of_{name}": ranges[name] ** 2 for name in ("angle", "rate")}
@@ -144,6 +150,25 @@ def _flowing(largest: Mapping[str, float]) -> Iterator[Effect]:
             depends_on=(by, "history") if by else ("history",),
             of_two=bool(by),
         )
+
+
+def _lagging(largest: Mapping[str, float]) -> Effect:
+    """What is taken up at once and forgotten; a Maxwell branch whose spring is not straight."""
+    name = "lagging_moment_of_angle_and_history"
+    fixed: dict[str, Any] = {"variable": "angle", "reach": largest["angle"]}
+    fixed["memory"] = memory_of(name, largest)
+    forms = [
+        _law_form(f"{label}{words}", fixed | numbers | {"base": base, "coefficients": coefficients})
+        for base, words in (("lagging", ""), ("lagging_even", ", even"))
+        for label, coefficients, numbers in shapes(name, 3)
+        # An odd line is a listed effect.
+        if (base, label) != ("lagging", "linear")
+    ]
+    about = "moment of the angle that is forgotten"
+    depends_on = ("angle", "history")
+    return Effect(
+        name, "picture_frame", about, tuple(forms), acts_on="moment", depends_on=depends_on
+    )
 
 
 def _by_run(largest: Mapping[str, float]) -> Iterator[Effect]:
