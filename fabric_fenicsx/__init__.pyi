@@ -62,6 +62,7 @@ from .mechanics.laws.law import in_degrees as in_degrees
 from .mechanics.laws.law import number as number
 from .mechanics.laws.law import per_area as per_area
 from .mechanics.laws.shaped import ShapedLaw as ShapedLaw
+from .mechanics.laws.shaped import product_of as product_of
 from .mechanics.laws.shaped import shape_of as shape_of
 from .mechanics.terms import Term as Term
 from .mechanics.terms import energy_term as energy_term

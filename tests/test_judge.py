@@ -73,14 +73,16 @@ def test_noise_of_far_more_than_was_stated_accounts_for_nothing():
 
 
 @pytest.mark.parametrize(
-    ("correlation", "beside", "alone"), [(0.3, 0, 0), (0.7, 1, 0), (0.9, 1, 1)]
+    ("correlation", "named", "term", "alone"),
+    [(0.1, 0, 0, 0), (0.3, 1, 0, 0), (0.7, 1, 1, 0), (0.9, 1, 1, 1)],
 )
-def test_slow_noise_is_doubted_sooner_beside_a_name(correlation, beside, alone):
-    judge, model = judged(stated=None)
-    variances = replace(model.estimate.variances, noise=Noise(SIGMA, correlation=correlation))
-    slow = replace(model, estimate=replace(model.estimate, variances=variances))
-    assert judge.doubtful_noise(slow) == bool(beside)
-    assert judge.doubtful_noise(replace(slow, effects=())) == bool(alone)
+def test_slow_noise_is_doubted_sooner_beside_a_name(correlation, named, term, alone):
+    for acts_on, doubted in (("", named), ("moment", term)):
+        judge, model = judged(acts_on, stated=None)
+        variances = replace(model.estimate.variances, noise=Noise(SIGMA, correlation=correlation))
+        slow = replace(model, estimate=replace(model.estimate, variances=variances))
+        assert judge.doubtful_noise(slow) == bool(doubted)
+        assert judge.doubtful_noise(replace(slow, effects=())) == bool(alone)
 
 
 def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None):

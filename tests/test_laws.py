@@ -410,8 +410,9 @@ def test_moments_on_one_way_alone(base, gamma, before, moment):
         {"base": "elastic", "variable": "recent_square_of_angle", "reach": 0.3, "memory_s": 20.0},
         {"base": "outward", "variable": "rate", "reach": 0.1},
         {"base": "forward", "variable": "rate", "reach": 0.1},
+        {"base": "flowing", "variable": "angle", "exponent": 3.0, "flow_rate_rad_s": 0.02},
     ],
-    ids=["state of rest", "wave", "mean square", "way out", "way on"],
+    ids=["state of rest", "wave", "mean square", "way out", "way on", "flow"],
 )
 def test_other_factors_are_the_same_in_both(numbers):
     compare_net_and_crossing(sample("shaped") | numbers)

@@ -186,6 +186,82 @@ def test_what_changes_from_run_to_run(tmp_path, measured, term, slope):
     assert found.values[f"{term}_1"] / 4.0 == pytest.approx(slope, rel=0.05)
 
 
+def recovering_zero(t, D, speed, run):
+    """A zero that the run before has moved comes back within 40 s."""
+    return force_of(D, speed) + 0.1 * run * np.exp(-t / 40.0)
+
+
+def slipping_belt(t, D, speed, run):
+    """Each run the frame goes 1 % less far than the crosshead says."""
+    return force_of(D * (1.0 - 0.01 * run), speed * (1.0 - 0.01 * run))
+
+
+def warming_guide(t, D, speed, run):
+    """A drag of 0.3 N s/mm at the end of the travel, and none at its beginning."""
+    return force_of(D, speed) + 0.3 * speed * D / 40.0
+
+
+def switched_heater(t, D, speed, run):
+    """A dashpot rises and falls by half within 31 s, faster than it would in a sine."""
+    theta = np.arccos((np.sqrt(2.0) + D / FRAME) / 2.0)
+    lever = FRAME * np.sin(theta)
+    wave = np.tanh(np.sin(2.0 * np.pi * t / 31.0)) / np.tanh(1.0)
+    return force_of(D, speed) + 2.5 * wave * speed / lever * FABRIC**2 / lever
+
+
+def hunting_supply(t, D, speed, run):
+    """A load cell's gain that goes up and down by a tenth within 47 s."""
+    return force_of(D, speed) * (1.0 + 0.1 * np.sin(2.0 * np.pi * t / 47.0))
+
+
+def worn_rack(t, D, speed, run):
+    """Play of 0.4 mm at the end of the travel, and none at its beginning, taken up within 5 mm."""
+    way = np.zeros_like(D)
+    for k in range(1, len(D)):
+        step = D[k] - D[k - 1]
+        way[k] = np.sign(step) + (way[k - 1] - np.sign(step)) * np.exp(-abs(step) / 5.0)
+    turning = np.abs(speed) * (np.sign(speed) - way) / 5.0
+    rate = speed - 0.4 * (way * speed + turning * D) / 40.0
+    return force_of(D * (1.0 - 0.4 * way / 40.0), rate)
+
+
+@pytest.mark.parametrize(
+    ("measured", "term", "label"),
+    [
+        (recovering_zero, "reading_of_time_and_run", "saturation, powers 1"),
+        (slipping_belt, "travel_of_displacement_and_run", "linear, powers 1"),
+        (warming_guide, "reading_of_displacement_and_rate", "linear, powers 1"),
+        (switched_heater, "viscous_moment_of_time", "time, periodic, 2 overtones"),
+        (hunting_supply, "reading_of_force_and_time", "gain, periodic"),
+        (worn_rack, "travel_of_displacement_and_direction", "linear, over a way"),
+    ],
+)
+def test_what_two_variables_make_together_leaves_noise(tmp_path, measured, term, label):
+    """In the run held out as well, and no single one of the same variables does."""
+    experiment = write(tmp_path / "set", measured, MORE)
+    by_name = {t.name: t for t in experiment.terms}
+    readings, white = experiment.readings, Variances(Noise(NOISE))
+    rows, holdout = readings.fit, readings.holdout & readings.usable
+
+    def left(variant):
+        little = {p.name: 1e-3 for p in variant.parameters}
+        starts = [BASE | little | shape for shape in variant.grid(amplitudes=False)]
+        fits = [fit(experiment, (variant,), start, rows, white) for start in starts]
+        return min(fits, key=lambda found: found.sum_of_squares)
+
+    found = left(next(v for v in by_name[term].variants if v.label == label))
+    assert found.rms(rows) < 1.3 * NOISE and found.rms(holdout) < 1.4 * NOISE
+    assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
+    acts_on, _, of = term.partition("_of_")
+    for variable in {*of.split("_and_")} - {"direction", "rate", "time"}:
+        one = next(
+            v
+            for v in by_name[f"{acts_on}_of_{variable}"].variants
+            if v.label in ("5 coefficients", "gain, 2 coefficients", "2 coefficients")
+        )
+        assert left(one).rms(rows) > 1.5 * NOISE, variable
+
+
 def sum_of_earlier(run, of):
     """What ``of(angle)`` of earlier runs add up to."""
     total = 0.0
@@ -377,6 +453,11 @@ def test_derivatives_of_what_remembers(tmp_path, name):
         ("elastic_moment_of_run", "saturation"),
         ("viscous_moment_of_run", "2 coefficients"),
         ("dissipative_moment_of_run", "linear"),
+        ("reading_of_time_and_run", "saturation, powers 0, 1"),
+        ("travel_of_displacement_and_run", "linear, powers 1"),
+        ("travel_of_displacement_and_force", "linear, powers 1"),
+        ("reading_of_force_and_rate", "gain, linear"),
+        ("travel_of_displacement_and_direction", "linear, over a way"),
     ],
 )
 def test_the_file_is_the_term(tmp_path, name, label):
@@ -384,7 +465,7 @@ def test_the_file_is_the_term(tmp_path, name, label):
     experiment = write(tmp_path / "set", wearing_spring, MORE)
     effect = next(t for t in experiment.terms if t.name == name)
     variant = next(v for v in effect.variants if v.label == label)
-    sizes = iter((0.3, -0.2, 0.4))
+    sizes = iter((0.3, -0.2, 0.4, 0.1))
     values = {p.name: p.starts[0] if p.starts else next(sizes) for p in variant.parameters}
     found = Discovered("discovered_1", effect, variant, BASE | values, pd.DataFrame(), "formula")
     (tmp_path / "discovered_1.py").write_text(effect_file(found, "made up"))

@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.integrate import solve_ivp
 from ufl import as_ufl
 
 from fabric_fenicsx.inputs.python_file import classes_of, run_file
@@ -37,14 +38,14 @@ RANGES = {
 }
 
 
-def marched(law, gammas, rate=None):
+def marched(law, gammas, step=STEP):
     """Moments and variables of a law over equal steps of time."""
     memory, before, found = {}, 0.0, []
     for gamma in gammas:
         at = Crossing(
             gamma=as_ufl(float(gamma)),
             gamma_n=as_ufl(before),
-            per_time=as_ufl(1.0 / STEP),
+            per_time=as_ufl(1.0 / step),
             number=lambda value: as_ufl(value) if np.isscalar(value) else value,
             past=lambda name, memory=memory: as_ufl(memory.get(name, 0.0)),
         )
@@ -95,6 +96,8 @@ def test_memories_fade():
         ("saturation", (0.7,), {"width": 0.2}),
         ("logarithm", (0.7,), {"width": 0.05}),
         ("periodic", (0.4, -0.6), {"width": 0.3}),
+        ("periodic", (0.4, -0.6, 0.2, 0.1), {"width": 0.3}),
+        ("bump", (0.4, -0.6), {"place": 0.4, "width": 0.1}),
         ("sign", (0.4,), {"width": 1e-3}),
         ("sides", (0.4, -0.6), {}),
     ],
@@ -137,6 +140,53 @@ def test_bases():
     for base, moments in expected.items():
         law = ShapedLaw(base, **one, k1=2.0, k3=5.0, stick_angle=0.2)
         assert marched(law, PATH)[0] == pytest.approx(moments), base
+
+
+def test_overtones_have_their_periods():
+    """Of half the width the second pair, of a third of it the third one."""
+    for k, coefficients in enumerate(([1.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0] * 4 + [1.0, 0.0])):
+        value = float(as_ufl(shape_of("periodic", coefficients, as_ufl(0.05), width=0.4)))
+        assert value == pytest.approx(np.sin(2.0 * np.pi * 0.05 * (k + 1) / 0.4)), k
+
+
+FLOWING = {"variable": "angle", "reach": 1.0, "coefficients": (), "constant": 2.0}
+#: Stick [rad], power and rate at the limit [rad/s] of a moment that flows.
+FLOW = {"stick_angle": 0.05, "exponent": 4.0, "flow_rate": 0.02}
+
+
+def test_a_flow_at_its_rate_reaches_its_limit():
+    """And at 16 times that twice as much, by its power of 4."""
+    law = ShapedLaw("flowing", **FLOWING, **FLOW)
+    for rate, moment, step in ((0.02, 2.0, 0.1), (0.32, 4.0, 0.01)):
+        late = marched(law, rate * step * np.arange(1, 61), step=step)[0][-1]
+        assert late == pytest.approx(moment, rel=0.01)
+
+
+def test_a_flow_decays_in_a_hold_as_its_power_says():
+    """ds/dt = −(r/δ) s⁴ from s₀: s = s₀ (1 + 3 (r/δ) t s₀³)^(−1/3), exactly."""
+    law = ShapedLaw("flowing", **FLOWING, **FLOW)
+    gamma = np.concatenate([[0.06], np.full(40, 0.06)])
+    s = marched(law, gamma)[0] / 2.0
+    t = STEP * np.arange(41)
+    assert s == pytest.approx(s[0] * (1.0 + 3.0 * 0.4 * t * s[0] ** 3) ** (-1.0 / 3.0), rel=1e-5)
+
+
+def test_a_flow_is_of_second_order_in_the_step():
+    """At the end of a ramp, against an integration to a tolerance."""
+    exact = solve_ivp(
+        lambda t, s: (0.03 - 0.02 * s**4) / 0.05, (0.0, 2.0), [0.0], rtol=1e-10, atol=1e-12
+    ).y[0, -1]
+
+    def error(count):
+        step = 2.0 / count
+        law = ShapedLaw("flowing", **FLOWING, **FLOW)
+        return abs(
+            marched(law, 0.03 * step * np.arange(1, count + 1), step=step)[0][-1] / 2 - exact
+        )
+
+    errors = [error(count) for count in (8, 16, 32)]
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert (orders > 1.8).all() and (orders < 2.3).all()
 
 
 def test_a_state_of_rest_follows_the_largest_angle():

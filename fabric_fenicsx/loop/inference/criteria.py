@@ -51,7 +51,8 @@ class Criteria:
         stated_within: relative sigma of a noise that was stated; convention.
         slow_noise: correlation of neighbouring readings beyond which noise looks like a misfit;
             convention.
-        slow_beside: ... beside an effect with a name, which may be another's; made-up.
+        slow_beside: ... beside a term without a formula, which may not be all; made-up.
+        slow_named: ... beside effects with names, where one without may do better; made-up.
         readings_per_knot, most_knots: of the smooth line that a misfit is looked for with;
             convention.
         blocks: parts, of several stretches each, that are left out in turn where there is one run;
@@ -101,6 +102,7 @@ class Criteria:
     stated_within: float = 0.15
     slow_noise: float = 0.8
     slow_beside: float = 0.5
+    slow_named: float = 0.15
     readings_per_knot: int = 8
     most_knots: int = 20
     blocks: int = 5

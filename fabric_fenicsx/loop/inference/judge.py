@@ -187,7 +187,9 @@ class Judge:
 
     def cost(self, model: Fit, effects: tuple[Effect, ...]) -> float:
         """What a model pays for its parameters and for the number of its kind."""
-        free = len(model.values) - len(model.at_bound)
+        # What is nothing costs nothing; a place or a time at the end of its range was looked for.
+        sought = {p.name for variant in model.variants for p in variant.shapes}
+        free = len(model.values) - len(set(model.at_bound) - sought)
         forms = sum(log(max(len(effect.variants), 1)) for effect in effects)
         sets = log(max(comb(len(self._effects), len(effects)), 1))
         return free * log(max(int(model.used.sum()), 2)) + 2.0 * (forms + sets)
@@ -220,7 +222,10 @@ class Judge:
     def doubtful_noise(self, model: Model) -> bool:
         """Whether noise is more than was stated or, where none was, as slow as a misfit."""
         if self.given is None:
-            slow = CRITERIA.slow_beside if model.effects else CRITERIA.slow_noise
+            slow = CRITERIA.slow_noise
+            if model.effects:
+                named = all(effect.listed for effect in model.effects)
+                slow = CRITERIA.slow_named if named else CRITERIA.slow_beside
             return model.estimate.variances.noise.correlation > slow
         return self.misfit(model).reading > CRITERIA.scatter * self.given
 

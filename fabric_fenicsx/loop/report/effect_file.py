@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from ... import __version__
 from ...mechanics.laws.shaped import OF_ELASTIC, shape_of
 from ..inference.effects import valued
@@ -77,6 +80,29 @@ FOUND = {found}
 EFFECTS = [ff.Effect("{name}", "{test}", "{about}", (FOUND,), of_fabric=False)]
 '''
 
+OF_THE_RIG_BY_TWO = '''
+from ufl import max_value, min_value
+
+import fabric_fenicsx as ff
+
+AMOUNT = ff.Parameter("{name}_amount", amplitude=True, meaning="1 as it was found")
+REACH, ALSO_REACH = {reach!r}, {also_reach!r}
+SHAPE = {{
+{numbers}
+}}
+
+
+def added(p, v, w):
+    """What is added, {y}, at {x} = v and {also_x} = w."""
+    shares = (max_value(min_value(n / r, 1), -1) for n, r in ((v, REACH), (w, ALSO_REACH)))
+    x, other = shares
+    return p["{name}_amount"] * ff.product_of(x=x, w=other, **SHAPE)
+
+
+FOUND = {found}
+EFFECTS = [ff.Effect("{name}", "{test}", "{about}", (FOUND,), of_fabric=False)]
+'''
+
 FOUND_OF_THE_RIG = 'ff.of_the_rig("as found", (AMOUNT,), "{acts_on}", "{variable}", added{options})'
 FOUND_OF_THE_RUN = 'ff.of_the_run("as found", (AMOUNT,), "{base}", added{options})'
 
@@ -140,15 +166,23 @@ def effect_file(term: Discovered, titles: str) -> str:
         carried: str = getattr(term.variant, "carried", "")
         words["carried"] = f'\n            carried="{carried}",' if carried else ""
         return (HEAD + LAW).format(numbers=lines, **words)
-    kept = ("memory", "turning", "slow", "gain", "stick_angle")
+    kept = ("memory", "turning", "slow", "way", "gain", "also", "stick_angle")
     more = "".join(f", {key}={numbers.pop(key)!r}" for key in kept if key in numbers)
     if "of" in numbers:
         words["found"] = FOUND_OF_THE_RUN.format(base=numbers.pop("of"), options=more)
     else:
         rig = {"variable": numbers.pop("variable"), "options": more, **words}
         words["found"] = FOUND_OF_THE_RIG.format(**rig)
-    numbers["kind"], constant = numbers.pop("shape"), numbers.pop("constant", 0.0)
+    numbers["kind"] = numbers.pop("shape")
+    if "powers" in numbers:
+        words |= {"also_x": shape.also, "also_reach": numbers.pop("also_reach")}
+        return (HEAD + OF_THE_RIG_BY_TWO).format(numbers=_lines(numbers), **words)
+    constant = numbers.pop("constant", 0.0)
     if numbers.pop("from_the_top", False):
         constant = -float(shape_of(x=1.0, **numbers))
-    lines = "\n".join(f"    {name!r}: {value!r}," for name, value in numbers.items())
-    return (HEAD + OF_THE_RIG).format(numbers=lines, constant=constant, **words)
+    return (HEAD + OF_THE_RIG).format(numbers=_lines(numbers), constant=constant, **words)
+
+
+def _lines(numbers: Mapping[str, Any]) -> str:
+    """Entries of a dictionary, one to a line."""
+    return "\n".join(f"    {name!r}: {value!r}," for name, value in numbers.items())

@@ -29,7 +29,7 @@ Variable = Literal[
     "recent_square_of_rate",
 ]
 AtHand = Literal["angle", "rate"]
-Kind = Literal["spline", "graded", "step", "saturation", "logarithm", "periodic"]
+Kind = Literal["spline", "graded", "step", "saturation", "logarithm", "periodic", "bump"]
 Base = Literal[
     "elastic",
     "rest",
@@ -42,6 +42,7 @@ Base = Literal[
     "even_in_rate",
     "outward",
     "forward",
+    "flowing",
 ]
 
 
@@ -104,7 +105,7 @@ Angles in rad, |γ| over its largest value so far, the path Σ|Δγ|, the time s
 all but the first two remember.
 """
 
-FRICTION = ("dissipative", "smooth")
+FRICTION = ("dissipative", "smooth", "flowing")
 """Bases that remember how far a stick is bent."""
 
 GRADED = (0.05, 0.1, 0.2, 0.4)
@@ -118,6 +119,18 @@ LEAST = 1e-6
 
 AT_HAND = ("angle", "rate")
 """Variables that do not remember."""
+
+
+def flowed(stick: Any, turns: Any, exponent: Any) -> Any:
+    """What is left of a moment over its limit, s, while it flows: ds/dt = −a s |s|^(n−1), exactly.
+
+    Args:
+        stick: s at first.
+        turns: a times the time.
+        exponent: n > 1.
+    """
+    more = exponent - 1
+    return stick * (1 + more * turns * (size_of(stick) + LEAST) ** more) ** (-1 / more)
 
 
 def shape_of(
@@ -135,15 +148,18 @@ def shape_of(
             Σ c_k x^k for the first two, then c_k (x − t_k)₊², of a knot below 0 c_k (t_k − x)₊²;
             "graded", one with the knots GRADED, for what bends at the beginning; "step",
             c / (1 + exp(−(x − x₀)/w)); "saturation", c (1 − exp(−x/w)); "logarithm",
-            c ln(1 + x/w); "periodic", c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1);
+            c ln(1 + x/w); "periodic", c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1), and overtones;
+            "bump", (c₁ + c₂ y) e^(−y²) with y = (x − x₀)/w, less what that is at 0;
             "sign", c tanh(x/w); "sides", c₁ x + c₂ |x|, each side of 0 with a slope of its own.
         coefficients: c or c_k.
         x: where.
-        place: x₀ of a step.
+        place: x₀ of a step or a bump.
         width: w.
         ends: between which the pieces of a spline lie.
     """
     c = coefficients
+    if not len(c):
+        return 0.0
     if kind == "step":
         start = 1 / (1 + exp(place / width))
         return c[0] * (1 / (1 + exp(-(x - place) / width)) - start)
@@ -152,8 +168,11 @@ def shape_of(
     if kind == "logarithm":
         return c[0] * ln(1 + x / width)
     if kind == "periodic":
-        turn = 2 * pi * x / width
-        return c[0] * sin(turn) + c[1] * (cos(turn) - 1)
+        turns = [2 * pi * (k + 1) * x / width for k in range(len(c) // 2)]
+        pairs = zip(c[::2], c[1::2], turns, strict=True)
+        return sum(a * sin(turn) + b * (cos(turn) - 1) for a, b, turn in pairs)
+    if kind == "bump":
+        return _bump(c, (x - place) / width) - _bump(c, -place / width)
     if kind == "sign":
         return c[0] * tanh(x / width)
     if kind == "sides":
@@ -165,6 +184,10 @@ def shape_of(
     for c_k, knot in zip(c[2:], GRADED if kind == "graded" else even, strict=True):
         value = value + c_k * max_value(knot - x if knot < 0.0 else x - knot, 0) ** 2
     return value
+
+
+def _bump(c: Any, y: Any) -> Any:
+    return (c[0] + c[1] * y) * exp(-(y**2))
 
 
 def product_of(
@@ -208,7 +231,9 @@ class ShapedLaw(CrossingLaw):
 
     Attributes:
         base: of what it is a factor: "elastic" k₁ γ + k₃ γ³, "viscous" γ̇, "dissipative" a friction
-            of limit 1 with a stick, "smooth" Dahl's of limit 1, "odd" sign γ, "even" 1,
+            of limit 1 with a stick, "smooth" Dahl's of limit 1, "flowing" a stick that gives way
+            the faster the more it is bent, ds/dt = (γ̇ − r s |s|^(n−1))/δ (F. H. Norton, The Creep
+            of Steel at High Temperatures, 1929), 1 where γ̇ is r for long, "odd" sign γ, "even" 1,
             "odd_in_rate" sign γ̇, "even_in_rate" 1, "outward" sign γ while |γ| grows, "forward" 1
             while γ grows. Of "rest" it is no factor but an angle, to which the spring has moved its
             state of rest: with e the elastic moment and s the sign of γ where it was largest so
@@ -221,7 +246,8 @@ class ShapedLaw(CrossingLaw):
         shape: one of those of ``shape_of`` that Kind names.
         place, width: its x₀ and w, as shares of v_max.
         k1, k3: of the elastic moment [N mm].
-        stick_angle: of a friction [rad].
+        stick_angle: δ, of a friction [rad].
+        exponent, flow_rate: n > 1 and r [rad/s], of one that flows.
         memory: τ of a variable that forgets [s].
         also: w, another variable that f depends on, if it does.
         also_reach: w_max [rad or rad/s].
@@ -243,6 +269,8 @@ class ShapedLaw(CrossingLaw):
     k1: Any = per_area("k1_N_mm", "linear part of the elastic base", NotNegative, 0.0)
     k3: Any = per_area("k3_N_mm", "cubic part of the elastic base", NotNegative, 0.0)
     stick_angle: Any = in_degrees("stick_angle_deg", "of a friction", default=0.5)
+    exponent: Any = number("exponent", "of a flow", default=5.0)
+    flow_rate: Any = number("flow_rate_rad_s", "at which a flow is at its limit", default=0.01)
     memory: Any = number("memory_s", "of a variable that forgets", default=1.0)
     also: AtHand | None = number("also", "another variable of the factor", AtHand | None, None)
     also_reach: Any = number("also_reach", "its largest value that was seen", default=1.0)
@@ -341,6 +369,11 @@ class ShapedLaw(CrossingLaw):
             step = at.change / at.number(self.stick_angle)
             kept, sign = exp(-size_of(step)), conditional(ge(step, 0), 1.0, -1.0)
             return kept * at.past("stick") + (1 - kept) * sign
+        if self.base == "flowing":
+            # Half of the flow before what bends the stick, half behind: of second order in Δt.
+            stick, n = at.number(self.stick_angle), at.number(self.exponent)
+            half = at.number(self.flow_rate) / (2 * stick * at.per_time)
+            return flowed(flowed(at.past("stick"), half, n) + at.change / stick, half, n)
         if self.base == "odd":
             return signed(at.gamma, 1.0)
         if self.base == "odd_in_rate":

@@ -1,37 +1,34 @@
-"""One tow that hangs from a clamp, by the beam model, with derivatives in its parameters.
+"""One tow that hangs from a clamp: the beam model in its plane, with derivatives in its parameters.
 
-The tow stands for the strip: it has the strip's weight and moments over one tow spacing. The
-clamp is at the origin, x goes out horizontally, z up; curvature, moment and slope are positive
-where the tow bends upwards. A turn φ of the root is exact: the model is solved with gravity
-turned by -φ and its shape turned by φ.
+The tow stands for the strip: it has the strip's weight and moments over one tow spacing; all here
+is per width. The clamp is at the origin, x goes out horizontally, z up; angles θ, curvature and
+moment are positive where the tow bends upwards.
 
-What an effect adds to the bending moment is one more term of the model, ∫ m(κ, s) δκ ds. The beam
-has one point per cell, so m and dm/dκ are numbers there, and any law is added without new forms.
-What it adds to the weight is a number in each cell as well, and half of it hangs at either end.
-At balance R(w, p) = 0, so dw/dp = -K⁻¹ ∂R/∂p (direct differentiation) from one factorisation.
+A hanging tow is statically determinate: the force in a cell is the weight W beyond it. With the
+beam's cells (mechanics.beam: one point each, half-way between its nodes' rotations) that leaves the
+nodes' angles, and of a cell from node i to i+1 with mean angle θ and length h
+
+    N = −W sin θ,  V = −W cos θ,  Γ1 = N/EA,  Γ2 = V/GA,  κ = (θ_{i+1} − θ_i)/h
+    M = B κ + m(κ, s),   c = N Γ2 − V (1 + Γ1)
+    R_i = M_{i−1} − M_i + (h c)_{i−1}/2 + (h c)_i/2 = 0,   r' = (1 + Γ1) d1 + Γ2 d3
+
+which are the model's balances with the displacements eliminated, one tridiagonal system. What an
+effect adds to the bending moment is m, to the weight a share of W. At balance R(θ, p) = 0, so
+dθ/dp = −K⁻¹ ∂R/∂p (direct differentiation) from one factorisation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mpi4py import MPI
-
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg.lapack import dgtsv, dpttrf
 
-from .... import _dolfinx
-from ...._dolfinx import Function
 from ....errors import SolveError
-from ....fabric.net import single_tow
 from ....fabric.section import RectangularSection
-from ....mechanics.beam import strain_change
-from ....mechanics.fields import ConnectorFields, TowFields
-from ....mechanics.terms import Term, work_term
-from ....solving.model import Model, Support
-from ....solving.update import advance_fields
 from ...expressions.marching import Marched, Varying
 
 __all__ = ["HangingTow", "Laws", "Shape", "sum_of"]
@@ -42,16 +39,18 @@ Array = npt.NDArray[np.float64]
 CELLS = 64
 #: Shortest cell, by the clamp, is this much shorter than the mean one.
 GRADING = 0.5
-#: Iterations from the last shape, and from that at less weight.
-LIMIT = 15
+#: Newton's iterations from the last shape, and from that at less weight.
+LIMIT = 20
+#: Largest change of an angle in one of them, and the one at which they are done [rad].
+FARTHEST, NEAREST = 1.0, 1e-9
+#: A cell whose ends are turned further against each other is too long for its curvature [rad].
+WOUND = np.pi / 2.0
 #: Newton's on the turn of the root.
 TURNS = 25
 #: Steps in which the weight is put on where it is put on gradually, failed ones included.
 STEPS = 40
 #: A first step this much shorter than it should be is not tried.
 HARDLY = 10.0
-#: Round-off of the forces in a tow whose stiffness is EA over its positions, in units of theirs.
-ROUNDING = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,44 +122,27 @@ class HangingTow:
         run: int = 0,
     ) -> None:
         self.length, self.run = length, run
-        self._spacing, self._weight = spacing, weight
-        section = RectangularSection(width, height, weight * spacing / (width * height), 1.0)
+        self._weight = weight
         t = np.linspace(0.0, 1.0, CELLS + 1)
         # Cells by the clamp, where strips bend most, are the shortest.
         self.arc = length * t * (1.0 - GRADING * (1.0 - t))
-        points = self.arc[:, None] * [1.0, 0.0, 0.0]
-        everywhere = np.arange(CELLS + 1)
-        # The section's density holds the weight, so gravity is a direction here.
-        self.model = Model(
-            single_tow(points, (0.0, 0.0, 1.0)),
-            section,
-            gravity=(0.0, 0.0, -1.0),
-            supports=[Support(np.array([0]), (0, 2, 4)), Support(everywhere, (1, 3, 5))],
-            extra=self._added,
-            comm=MPI.COMM_SELF,
-        )
-        self.model.system.refresh.append(self._refresh)
-        self._newton = self.model.newton(force_tolerance=1.0, limit=LIMIT)
-        self._unit = self.model.fields.stiffness.x.array.copy()
-        stretch, bend = section.stiffness()[[0, 4]]
-        self.stiffness_per_C1 = bend / spacing
+        self._cell = np.diff(self.arc)
+        density = weight * spacing / (width * height)
+        section = RectangularSection(width, height, density, 1.0).stiffness() / spacing
+        #: EA and GA.
+        self._per_C1 = section[[0, 2]]
+        self.stiffness_per_C1 = float(section[4])
         self.load_per_C1 = weight * length**3 / self.stiffness_per_C1
-        self._rounding = ROUNDING * np.finfo(float).eps * stretch * CELLS / (1.0 - GRADING)
-        fields = self.model.fields
-        self._cells = _dolfinx.cell_dofs(self._moment.function_space)[:, 0]
-        self._order = self.model.disc.local_cells
-        middle = (self.arc[1:] + self.arc[:-1])[self._order] / 2.0
         self._along = {
-            "s": Varying(middle),
+            "s": Varying((self.arc[1:] + self.arc[:-1]) / 2.0),
             "length": Varying(np.full(CELLS, length)),
             "run": Varying(np.full(CELLS, float(run))),
         }
-        self._even_mass = fields.mass.x.array.copy()
         self._even_weights = self._weights = self._at_nodes(np.ones(CELLS))
         self._weight_slopes: dict[str, Array] = {}
-        self._laws, self._values = NONE, {"B": 1.0}
-        self._phi, self._root = 0.0, 0.0
-        self._state = (fields.u_n.x.array, fields.q_n.x.array)
+        self._laws, self._values = NONE, {"B": 1.0, "C1_MPa": 1.0}
+        self._root = 0.0
+        self._angles = np.zeros(CELLS + 1)
 
     def solve(
         self, values: Mapping[str, float], laws: Laws = NONE, *, slopes: bool = True
@@ -178,60 +160,22 @@ class HangingTow:
         self._values = {**values, "B": values["C1_MPa"] * self.stiffness_per_C1}
         self._laws = laws
         self._load()
-        self.model.fields.stiffness.x.array[:] = values["C1_MPa"] * self._unit
-        self._newton.force_tolerance = self._rounding * values["C1_MPa"] + 1e-9 * float(
-            self._weights.sum() * self._spacing
-        )
         phi = float(self._turn(self._root).value)
         for _ in range(TURNS):
-            self._balance(phi)
-            self._root = -float(self._weights @ self._positions()[0])
+            at = self._balance(phi)
+            self._root = -float(self._weights @ at.positions()[0])
             turn = self._turn(self._root)
-            miss = self._phi - float(turn.value)
+            miss = phi - float(turn.value)
             if abs(miss) < 1e-12:
                 break
-            follows = float(turn.slopes["root"]) * self._root_slope(self._by_turn(self._solver()))
-            phi = self._phi - miss / (1.0 - follows)
+            follows = float(turn.slopes["root"]) * self._root_slope(at.by_turn())
+            phi -= miss / (1.0 - follows)
         else:
             raise SolveError(f"the root of a strip of {self.length:g} mm does not come to rest")
-        x, z = self._positions()
-        return Shape(x, z, self._slopes() if slopes else {}, self._curvature()[self._ordered()])
+        x, z = at.positions()
+        return Shape(x, z, self._slopes(at) if slopes else {}, at.curvature)
 
-    # The term -----------------------------------------------------------------------------
-
-    def _added(self, fields: TowFields, _: ConnectorFields | None) -> list[Term]:
-        """∫ M δK ds with M and dM/dK given in each cell.
-
-        The geometric part of the tangent is left out: in the plane it vanishes at w = 0, where the
-        derivatives are taken, and is of third order beside the rest in an increment.
-        """
-        numbers = _dolfinx.constants_per_cell(fields.mesh, 1)
-        self._moment, self._rigidity = Function(numbers), Function(numbers)
-        v, dw = (strain_change(fields, f)[4] for f in (fields.test, fields.trial))
-        return [
-            work_term(
-                "added bending",
-                fields,
-                self._moment * v * fields.middle,
-                self._rigidity * v * dw * fields.middle,
-                symmetric=True,
-            )
-        ]
-
-    def _refresh(self) -> None:
-        if self._laws.bend:
-            added = self._moments(self._curvature())
-            # About d2, to the right of the tow, bending is positive downwards.
-            self._moment.x.array[self._cells] = -self._spacing * added.value
-            self._rigidity.x.array[self._cells] = self._spacing * added.slopes.get("kappa", 0.0)
-        else:
-            self._moment.x.array[:] = 0.0
-            self._rigidity.x.array[:] = 0.0
-
-    def _curvature(self) -> Array:
-        """In each local cell, positive upwards [1/mm]."""
-        stiffness = self._values["B"] * self._spacing
-        return -self.model.system.section_forces()[:, 4] / stiffness
+    # What effects add ---------------------------------------------------------------------
 
     def _moments(self, kappa: Array) -> Varying:
         """Added moment per width [N], (n_cells,), with derivatives in kappa, B and parameters.
@@ -253,23 +197,19 @@ class HangingTow:
         return sum_of(law(self._along, self._values)["unloaded"] for law in self._laws.unloaded)
 
     def _load(self) -> None:
-        """Put the weight on that the laws say, in the cells and at the nodes."""
-        self.model.fields.mass.x.array[:] = self._even_mass
+        """Put the weight on that the laws say."""
         self._weights, self._weight_slopes = self._even_weights, {}
         if not self._laws.loads:
             return
         more = sum_of(law(self._along, self._values)["load"] for law in self._laws.loads)
-        factor = 1.0 + np.broadcast_to(more.value, (CELLS,))
-        self.model.fields.mass.x.array.reshape(CELLS, -1)[self._cells] *= factor[:, None]
-        self._weights = self._at_nodes(factor)
+        self._weights = self._at_nodes(1.0 + np.broadcast_to(more.value, (CELLS,)))
         self._weight_slopes = {
             name: self._at_nodes(slope) for name, slope in more.slopes.items() if name != "B"
         }
 
     def _at_nodes(self, factor: Array) -> Array:
         """The weight per width [N/mm] at each node if it is this many times what it is, (n,)."""
-        half = np.diff(self.arc) / 2.0 * self._weight
-        half = half * np.broadcast_to(factor, half.shape)[self._ordered()]
+        half = self._cell / 2.0 * self._weight * factor
         return np.append(half, 0.0) + np.append(0.0, half)
 
     def _turn(self, root: float) -> Varying:
@@ -278,141 +218,109 @@ class HangingTow:
 
     # Balance ------------------------------------------------------------------------------
 
-    def _balance(self, phi: float) -> None:
+    def _at(self, angles: Array, load: float = 1.0) -> _Cells:
+        """The cells at angles of the nodes, with so much of the weight."""
+        C1, B = self._values["C1_MPa"], self._values["B"]
+        kappa = np.diff(angles) / self._cell
+        added = self._moments(kappa) if self._laws.bend else None
+        moment, rigidity = B * kappa, np.full(CELLS, B)
+        if added is not None:
+            moment = moment + added.value
+            rigidity = rigidity + added.slopes.get("kappa", 0.0)
+        mean = (angles[1:] + angles[:-1]) / 2.0
+        soft = 1.0 / (C1 * self._per_C1)
+        beyond = load * _beyond(self._weights)
+        return _Cells(self._cell, mean, beyond, soft, kappa, moment, rigidity)
+
+    def _balance(self, phi: float) -> _Cells:
         """Come to rest at a turn of the root.
 
         Raises:
             SolveError: also with the weight put on gradually there is no convergence.
         """
-        self._phi = phi
-        before = [values.copy() for values in self._state]
-        if self._step(1.0):
-            return
-        self._restore(self._unloaded())
+        before = self._angles
+        found = self._step(phi, 1.0)
+        if found is not None:
+            return found
+        self._angles = phi + self._unloaded()
         # What bends the linear strip by half a radian or so.
         first = min(0.2, 4.0 * self._values["C1_MPa"] / self.load_per_C1)
         done, step = 0.0, first
         for _ in range(STEPS):
             target = min(done + step, 1.0)
-            if self._step(target):
+            found = self._step(phi, target)
+            if found is not None:
                 done, step = target, 2.0 * step
                 if done == 1.0:
-                    return
+                    return found
             else:
                 step /= 3.0
                 if done == 0.0 and step < first / HARDLY:
                     break
-        self._restore(before)
+        self._angles = before
         raise SolveError(
             f"a strip of {self.length:g} mm finds no balance under more than {done:.3g} of its "
             "weight"
         )
 
-    def _unloaded(self) -> list[Array]:
-        """Displacements and rotations without weight: arcs of the unloaded curvature."""
-        cell = np.diff(self.arc)
-        kappa = np.broadcast_to(self._at_rest().value, cell.shape)[self._ordered()]
-        turn = np.append(0.0, np.cumsum(kappa * cell))
-        # The chord of each cell's arc.
-        chord, along = cell * np.sinc(kappa * cell / 2.0 / np.pi), (turn[1:] + turn[:-1]) / 2.0
-        x = np.append(0.0, np.cumsum(chord * np.cos(along)))
-        z = np.append(0.0, np.cumsum(chord * np.sin(along)))
-        zero = np.zeros_like(x)
-        u = np.stack([x - self.arc, zero, z], axis=1)
-        q = np.stack([np.cos(turn / 2.0), zero, -np.sin(turn / 2.0), zero], axis=1)
-        blocks = self.model.disc.local_nodes
-        return [u[blocks].ravel(), q[blocks].ravel()]
+    def _unloaded(self) -> Array:
+        """Angles of the nodes without weight: those of the unloaded curvature."""
+        kappa = np.broadcast_to(self._at_rest().value, self._cell.shape)
+        return np.append(0.0, np.cumsum(kappa * self._cell))
 
-    def _step(self, load: float) -> bool:
-        model, newton = self.model, self._newton
-        model.gravity.value[:] = load * np.array([-np.sin(self._phi), 0.0, -np.cos(self._phi)])
-        newton.x.set(0.0)
-        if not newton.solve(model.targets(0.0, 0.0)).converged:
-            return False
-        model.disc.everywhere(advance_fields)
-        return True
-
-    def _restore(self, state: Sequence[Array]) -> None:
-        for values, saved in zip(self._state, state, strict=True):
-            values[:] = saved
-
-    def _nodes(self, local: Array) -> Array:
-        return self.model.disc.gather_nodes(local)
-
-    def _positions(self) -> Array:
-        """X and z of the nodes, the root's turn included, (2, n)."""
-        moved = self._nodes(self._state[0].reshape(-1, 3)[: self.model.disc.owned])
-        return self._turned(np.stack([self.arc + moved[:, 0], moved[:, 2]]))
-
-    def _turned(self, plane: Array) -> Array:
-        c, s = np.cos(self._phi), np.sin(self._phi)
-        return np.array([[c, -s], [s, c]]) @ plane
+    def _step(self, phi: float, load: float) -> _Cells | None:
+        """Newton's iterations from the last angles; None unless they end at a stable balance."""
+        angles = self._angles + (phi - self._angles[0])
+        for _ in range(LIMIT):
+            with np.errstate(all="ignore"):
+                at = self._at(angles, load)
+                change = at.solved(-at.residual())
+            largest = float(np.abs(change).max())
+            if not np.isfinite(largest):
+                return None
+            angles[1:] += change * min(1.0, FARTHEST / max(largest, FARTHEST))
+            if largest < NEAREST:
+                at = self._at(angles, load)
+                if not at.stable() or np.abs(np.diff(angles)).max() > WOUND:
+                    return None
+                self._angles = angles
+                return at
+        return None
 
     # Derivatives --------------------------------------------------------------------------
-
-    def _solver(self) -> Callable[[Array], Array]:
-        """From nodal forces (n, 6) to what they do to x and z, (2, n), with the tangent here."""
-        newton, disc = self._newton, self.model.disc
-        newton.x.set(0.0)
-        self.model.system.set_increment(newton.x, linearise_from="zero")
-        solve = newton.factorised()
-        blocks = disc.local_nodes[: disc.owned]
-        held = self.model.fixed
-
-        def moved(forces: Array) -> Array:
-            b = disc.vector()
-            b.array[:] = forces[blocks].ravel()
-            b.array[held] = 0.0
-            w = self._nodes(solve(b).array_r.reshape(-1, 6))
-            return self._turned(w[:, [0, 2]].T)
-
-        return moved
-
-    def _pulled(self, weights: Array) -> Array:
-        """Nodal forces of weights per width, (n, 6)."""
-        forces = np.zeros((len(self.arc), 6))
-        forces[:, 0] = -np.sin(self._phi) * weights * self._spacing
-        forces[:, 2] = -np.cos(self._phi) * weights * self._spacing
-        return forces
-
-    def _by_turn(self, solve: Callable[[Array], Array]) -> Array:
-        """Derivative of x and z in the turn of the root, (2, n)."""
-        forces = np.zeros((len(self.arc), 6))
-        forces[:, 0] = -np.cos(self._phi) * self._weights * self._spacing
-        forces[:, 2] = np.sin(self._phi) * self._weights * self._spacing
-        x, z = self._positions()
-        return solve(forces) + np.stack([-z, x])
 
     def _root_slope(self, moved: Array) -> float:
         """Change of the root's moment per width when the nodes move, (2, n)."""
         return -float(self._weights @ moved[0])
 
-    def _slopes(self) -> dict[str, Array]:
-        solve = self._solver()
+    def _slopes(self, at: _Cells) -> dict[str, Array]:
         C1 = self._values["C1_MPa"]
-        added = self._moments(self._curvature())
-        # At balance the tow's own forces, which are proportional to C1, are weight less the rest.
-        own = self._pulled(self._weights) - self._work(added.value)
-        forces = {"C1_MPa": -own / C1}
-        for name, slope in added.slopes.items():
-            if name == "B":
-                forces["C1_MPa"] = forces["C1_MPa"] - self._work(slope) * self.stiffness_per_C1
-            elif name != "kappa":
-                forces[name] = -self._work(slope)
-        for name, weights in self._weight_slopes.items():
-            forces[name] = forces.get(name, 0.0) + self._pulled(weights)
-        slopes = {name: solve(force) for name, force in forces.items()}
-        return self._with_turn(slopes, solve) if self._laws.slopes else slopes
+        moments = {"C1_MPa": self.stiffness_per_C1 * at.curvature}
+        if self._laws.bend:
+            for name, slope in self._moments(at.curvature).slopes.items():
+                if name == "B":
+                    moments["C1_MPa"] = moments["C1_MPa"] + slope * self.stiffness_per_C1
+                elif name != "kappa":
+                    moments[name] = slope
+        heavier = {name: _beyond(weights) for name, weights in self._weight_slopes.items()}
+        names = list({**moments, **heavier})
+        moment, beyond = np.zeros((2, len(names), CELLS))
+        strains = np.zeros((2, len(names), CELLS))
+        # It comes first.
+        strains[:, 0] = -at.strains / C1
+        for k, name in enumerate(names):
+            moment[k], beyond[k] = moments.get(name, 0.0), heavier.get(name, 0.0)
+        moved = at.moved(moment, strains, beyond)
+        slopes = {name: moved[:, k] for k, name in enumerate(names)}
+        return self._with_turn(slopes, at) if self._laws.slopes else slopes
 
-    def _with_turn(
-        self, held: dict[str, Array], solve: Callable[[Array], Array]
-    ) -> dict[str, Array]:
+    def _with_turn(self, held: dict[str, Array], at: _Cells) -> dict[str, Array]:
         """Derivatives with the root following, from those with the root held."""
         direct = {name: float(slope) for name, slope in self._turn(self._root).slopes.items()}
         follows = direct.pop("root", 0.0)
         through_B = direct.pop("B", 0.0)
         direct["C1_MPa"] = through_B * self.stiffness_per_C1
-        by_turn, x = self._by_turn(solve), self._positions()[0]
+        by_turn, x = at.by_turn(), at.positions()[0]
         rigidity = 1.0 - follows * self._root_slope(by_turn)
         slopes = {}
         for name in {**held, **direct}:
@@ -422,18 +330,120 @@ class HangingTow:
             slopes[name] = own + by_turn * turned / rigidity
         return slopes
 
-    def _work(self, moment: Any) -> Array:
-        """Nodal forces of the added term for moments per width in the cells, (n, 6)."""
-        if not self._laws.bend:
-            return np.zeros((len(self.arc), 6))
-        kept = self._moment.x.array.copy()
-        self._moment.x.array[self._cells] = -self._spacing * moment
-        forces = self._nodes(self.model.system.term_forces("added bending"))
-        self._moment.x.array[:] = kept
+
+class _Cells:
+    """The cells of a tow at some angles; see the module's docstring. All (n_cells,).
+
+    Args:
+        h: lengths [mm].
+        theta: mean angles [rad].
+        W: weight beyond, per width [N/mm].
+        soft: 1/EA and 1/GA, per width [mm/N].
+        curvature: [1/mm].
+        moment: M, per width [N].
+        rigidity: dM/dκ [N mm].
+
+    Attributes:
+        N, V: forces [N/mm].
+        strains: Γ1 and Γ2 [-], (2, n_cells).
+        curvature: as given.
+    """
+
+    def __init__(
+        self,
+        h: Array,
+        theta: Array,
+        W: Array,
+        soft: Array,
+        curvature: Array,
+        moment: Array,
+        rigidity: Array,
+    ) -> None:
+        self._h, self._soft = h, soft
+        self._c, self._s = np.cos(theta), np.sin(theta)
+        self.curvature, self._moment = curvature, moment
+        self.N, self.V = -W * self._s, -W * self._c
+        self.strains = np.array([self.N * soft[0], self.V * soft[1]])
+        # What each node of a cell gets of its neighbour's turn, and of its own.
+        by_angle = h / 4.0 * (self.N + (self.V**2 - self.N**2) * (soft[1] - soft[0]))
+        bent = rigidity / h
+        self._beside, own = by_angle - bent, by_angle + bent
+        #: Of K, whose first node is held.
+        self._diagonal = own
+        self._diagonal[:-1] += own[1:]
+
+    def residual(self) -> Array:
+        """R of the nodes that are free."""
+        gamma1, gamma2 = self.strains
+        return self._to_nodes(self._moment, self.N * gamma2 - self.V * (1.0 + gamma1))
+
+    def _to_nodes(self, moment: Array, c: Array) -> Array:
+        turning = self._h * c / 2.0
+        forces = moment + turning
+        forces[..., :-1] += (turning - moment)[..., 1:]
         return forces
 
-    def _ordered(self) -> npt.NDArray[np.int64]:
-        return np.argsort(self._order)
+    def solved(self, forces: Array) -> Array:
+        """K⁻¹ times what acts on the free nodes; not a number where there is none."""
+        beside = self._beside[1:]
+        *_, found, failed = dgtsv(beside, self._diagonal, beside, forces.T)
+        return np.full_like(forces, np.nan) if failed else found.T
+
+    def stable(self) -> bool:
+        """Whether the balance is one that a strip rests in: K is positive definite."""
+        *_, failed = dpttrf(self._diagonal, self._beside[1:])
+        return not failed
+
+    def positions(self) -> Array:
+        """X and z of the nodes [mm], (2, n)."""
+        gamma1, gamma2 = self.strains
+        return self._summed(self._turned(1.0 + gamma1, gamma2))
+
+    def by_weight(self, beyond: Array) -> tuple[Array, Array]:
+        """What N and V change by when W changes by so much."""
+        return -beyond * self._s, -beyond * self._c
+
+    def moved(self, moment: Array, strains: Array, beyond: Array, turn: float = 0.0) -> Array:
+        """What x and z of the nodes change by, (2, n_changes, n), with the angles following.
+
+        Args:
+            moment: what M changes by where the angles stay, (n_changes, n_cells).
+            strains: likewise Γ1 and Γ2 for other reasons than W, (2, n_changes, n_cells).
+            beyond: W, (n_changes, n_cells).
+            turn: change of the root's angle.
+        """
+        gamma1, gamma2 = self.strains
+        dN, dV = self.by_weight(beyond)
+        first, second = strains[0] + dN * self._soft[0], strains[1] + dV * self._soft[1]
+        c = dN * gamma2 + self.N * second - dV * (1.0 + gamma1) - self.V * first
+        forces = -self._to_nodes(moment, c)
+        forces[:, 0] -= turn * self._beside[0]
+        angles = np.empty((len(forces), len(self._h) + 1))
+        angles[:, 0], angles[:, 1:] = turn, self.solved(forces)
+        mean = (angles[:, 1:] + angles[:, :-1]) / 2.0
+        along = first + mean * (self.V * self._soft[0] - gamma2)
+        across = second + mean * (1.0 + gamma1 - self.N * self._soft[1])
+        return self._summed(self._turned(along, across))
+
+    def by_turn(self) -> Array:
+        """Derivative of x and z in the root's angle, (2, n)."""
+        zero = np.zeros((1, len(self._h)))
+        return self.moved(zero, np.stack([zero, zero]), zero, 1.0)[:, 0]
+
+    def _turned(self, along: Array, across: Array) -> Array:
+        """X and z of a vector with components along d1 and d3."""
+        return np.array([self._c * along - self._s * across, self._s * along + self._c * across])
+
+    def _summed(self, rate: Array) -> Array:
+        """From the clamp on."""
+        found = np.zeros((*rate.shape[:-1], rate.shape[-1] + 1))
+        np.cumsum(self._h * rate, axis=-1, out=found[..., 1:])
+        return found
+
+
+def _beyond(weights: Array) -> Array:
+    """What weights at the nodes add up to beyond each cell, (n_cells,)."""
+    return np.cumsum(weights[::-1])[::-1][1:]
 
 
 def sum_of(parts: Any) -> Varying:

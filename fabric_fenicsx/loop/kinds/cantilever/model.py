@@ -1,6 +1,6 @@
 """Cantilevers: strips of several overhangs that hang from a clamp under their own weight.
 
-A strip is one tow of the beam model with the strip's weight over one tow spacing (loop.hanging);
+A strip is one tow of the beam model with the strip's weight over one tow spacing (hanging);
 its stiffness is that of the paper's section, B = 6 C1 I per spacing, and C1 is fitted.
 
 Heights are compared: at the arc length of a reading where that is given. Where it is not, x may be
@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
@@ -399,7 +399,9 @@ class Cantilever:
         self, own: _Specimen, x: Array, z: Array, slopes: Mapping[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
         """Expected readings of a specimen and their derivatives, from those of the nodes."""
-        line = CubicSpline(own.tow.arc, np.stack([x, z], axis=1))
+        # Of the places and of what they change by at once: they have the same nodes.
+        every = CubicSpline(own.tow.arc, np.stack([(x, z), *slopes.values()]).transpose(2, 0, 1))
+        line = PPoly.construct_fast(every.c[:, :, 0], every.x)
         at = self._places(own, line)
         readings = np.stack([own.x, own.z], axis=1)
         along = line(at, 1)
@@ -414,12 +416,11 @@ class Cantilever:
         # The place on the line moves as well, but only along it; beyond the ends of the line a
         # reading is compared with its tangent, which turns.
         beyond = np.einsum("nd,nd->n", along, readings - line(at)) * free
-        moved = CubicSpline(own.tow.arc, np.stack(list(slopes.values())).transpose(2, 0, 1))
-        change = moved(at) + beyond[:, None, None] * moved(at, 1)
+        change = (every(at) + beyond[:, None, None] * every(at, 1))[:, 1:]
         changes = np.einsum("nkd,nd->kn", change, normal)
         return expected, dict(zip(slopes, changes, strict=True))
 
-    def _places(self, own: _Specimen, line: CubicSpline) -> Array:
+    def _places(self, own: _Specimen, line: PPoly) -> Array:
         """Arc length of each reading [mm]: as given, or of the nearest point of a line."""
         free = np.isnan(own.s)
         at = own.s.copy()

@@ -15,7 +15,7 @@ differs from clamp_tilt by as much as a strip bends differently when it is tilte
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -28,6 +28,7 @@ from ....mechanics.bending_laws import TabulatedBending
 from ....mechanics.scalars import numpy_function, symbol
 from ...inference.effects import Effect, Shape, Values, of_run
 from ..records import FEWEST_BEFORE
+from .products import products
 from .shapes import (
     HEAVIEST,
     LARGEST,
@@ -39,6 +40,7 @@ from .shapes import (
     splines,
     wave,
 )
+from .term import X, Y, of_strip, strip_effect, strip_form, times, turned
 from .variant import StripVariant
 
 __all__ = ["strip_term", "terms"]
@@ -67,7 +69,12 @@ def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
             "runs" of its specimen were before one: with less than two there are no terms by them.
         runs: that are fitted, counted from 0.
     """
-    found = [*_of_the_strip(ranges), *_of_the_camera(ranges), *_by_run(ranges)]
+    found = [
+        *_of_the_strip(ranges),
+        *_of_the_camera(ranges),
+        *_by_run(ranges),
+        *products(ranges),
+    ]
     return [*(_with_ranges(term, ranges) for term in found), *_of_the_run(runs)]
 
 
@@ -140,7 +147,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         for label, parameters, g in along_the_strip(name, end)
     ]
     about = "bending stiffness that varies along the strip"
-    yield _term(name, about, "bending_moment", ("arc_length",), forms)
+    yield strip_effect(name, about, "bending_moment", ("arc_length",), forms)
 
     name = "bending_moment_of_curvature"
     starts = tuple(bend * share for share in HALF_WAY)
@@ -160,22 +167,21 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         for label, parameters, g in splines(name, SPLINES)
     ]
     about, of = "any odd law of the curvature", ("nonlinear_bending",)
-    yield _term(name, about, "bending_moment", ("curvature",), forms, of)
+    yield strip_effect(name, about, "bending_moment", ("curvature",), forms, of)
 
     for acts_on, unit, about in (
         ("rest_curvature", bend, "curvature of the unloaded strip"),
         ("load", 1.0, "weight"),
     ):
-        to = "added_curvature" if acts_on == "rest_curvature" else "load"
         # A weight that is even is no other than B, and a curvature has nothing to stand for it.
         constant = acts_on == "rest_curvature"
         name = f"{acts_on}_of_arc_length"
         forms = [
-            _form(
+            strip_form(
                 _from(label, end),
                 parameters,
-                Shape(X[end], Y[acts_on], longest, partial(_times, unit, g)),
-                to,
+                Shape(X[end], Y[acts_on], longest, partial(times, unit, g)),
+                acts_on,
                 partial(_of_place, unit, g, end, longest),
             )
             for end in ENDS
@@ -186,40 +192,21 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
                 *([wave(name)] if constant and end == "clamp" else []),
             )
         ]
-        yield _term(name, f"{about} that varies along the strip", acts_on, ("arc_length",), forms)
+        yield strip_effect(
+            name, f"{about} that varies along the strip", acts_on, ("arc_length",), forms
+        )
         name = f"{acts_on}_of_length"
         forms = [
-            _form(
+            strip_form(
                 label,
                 parameters,
-                Shape("length_mm", Y[acts_on], longest, partial(_times, unit, g)),
-                to,
-                partial(_of_strip, unit, g, "length", longest),
+                Shape("length_mm", Y[acts_on], longest, partial(times, unit, g)),
+                acts_on,
+                partial(of_strip, unit, g, "length", longest),
             )
             for label, parameters, g in splines(name, SPLINES[:1], constant=constant)
         ]
-        yield _term(name, f"{about} that goes by the overhang", acts_on, ("length",), forms)
-
-
-X = {"clamp": "arc_length_mm", "free end": "from_the_free_end_mm"}
-Y = {"rest_curvature": "rest_curvature_1_mm", "load": "share_of_weight"}
-"""Variables and what is added, with units."""
-
-
-def _form(
-    label: str,
-    parameters: tuple[Parameter, ...],
-    shape: Shape,
-    to: str,
-    of: Callable[[Values, Values], Any],
-) -> StripVariant:
-    if to == "load":
-        return StripVariant(label, parameters, shape=shape, load=of)
-    return StripVariant(label, parameters, shape=shape, added_curvature=of)
-
-
-def _times(unit: float, g: Of, p: Values, x: Any) -> Any:
-    return unit * g(p, x)
+        yield strip_effect(name, f"{about} that goes by the overhang", acts_on, ("length",), forms)
 
 
 def _centred(g: Of, end: str, p: Values, x: Any) -> Any:
@@ -268,11 +255,6 @@ def _of_place(unit: float, g: Of, end: str, longest: float, p: Values, at: Value
     return unit * g(p, _along(end, longest, at))
 
 
-def _of_strip(unit: float, g: Of, by: str, most: float, p: Values, at: Values) -> Any:
-    """Of what is the same all along a strip, its "length" or its "run"."""
-    return unit * g(p, min_value(at[by] / most, 1))
-
-
 # Camera ---------------------------------------------------------------------------------------
 
 
@@ -287,24 +269,26 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         camera = partial(_higher, of, by, most, unit)
         y = "share_of_height" if unit is None else "height_mm"
         names = {"x": "distance_mm", "z": "height_mm", "length": "length_mm"}
-        shape = Shape(names[by], y, most, partial(_times, unit or 1.0, of))
+        shape = Shape(names[by], y, most, partial(times, unit or 1.0, of))
         return StripVariant(f"{to}, {label}", parameters, shape=shape, camera=camera)
 
     name = "reading_of_height"
     even = coefficient(f"{name}_0")
     forms = [form("even", (even,), lambda p, x: p[even.name], "z", "scale")]
     forms += [form(*shape, "z", "scale") for shape in splines(name, SPLINES)]
-    yield _term(name, "scale of heights", "reading", ("height",), forms)
+    yield strip_effect(name, "scale of heights", "reading", ("height",), forms)
 
     name = "reading_of_distance"
     turn = Parameter(f"{name}_turn_rad", amplitude=True)
     shape = Shape("distance_mm", "height_mm", width, lambda p, x: p[turn.name] * width * x)
-    forms = [StripVariant("turned", (turn,), shape=shape, camera=partial(_turned, turn.name))]
+    forms = [
+        StripVariant("turned", (turn,), shape=shape, camera=lambda p, at: turned(p[turn.name], at))
+    ]
     forms += [form(*shape, "x", "scale") for shape in splines(name, SPLINES)]
     forms += [form(*shape, "x", "height") for shape in splines(name, SPLINES[1:])]
     forms.append(form(*wave(name), "x", "height"))
     about = "heights, or their scale, by the distance from the clamp"
-    yield _term(name, about, "reading", ("distance",), forms)
+    yield strip_effect(name, about, "reading", ("distance",), forms)
 
     name = "reading_of_height_and_distance"
     radial = tuple(Parameter(f"{name}_{of}", amplitude=True) for of in ("x", "z"))
@@ -313,7 +297,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     shape = Shape("from_the_clamp_mm", "share_of_height", longest, lambda p, x: p[by_z] * x**2)
     forms = [StripVariant("radial", radial, shape=shape, camera=camera)]
     about = "scale of the picture by the distance from the clamp in it"
-    yield _term(name, about, "reading", ("height", "distance"), forms)
+    yield strip_effect(name, about, "reading", ("height", "distance"), forms)
 
     name = "reading_of_length"
     forms = [
@@ -321,7 +305,9 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         for to in ("scale", "height")
         for shape in splines(name, SPLINES[:1])
     ]
-    yield _term(name, "heights, or their scale, by the overhang", "reading", ("length",), forms)
+    yield strip_effect(
+        name, "heights, or their scale, by the overhang", "reading", ("length",), forms
+    )
 
 
 def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
@@ -340,23 +326,28 @@ def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
         for label, parameters, g in over_runs(name)
     ]
     about = "bending stiffness that changes from run to run of a specimen"
-    yield _term(name, about, "bending_moment", ("run",), forms)
-    name = "rest_curvature_of_run"
-    forms = [
-        StripVariant(
-            label,
-            parameters,
-            shape=Shape("runs_before", Y["rest_curvature"], last, partial(_times, bend, g)),
-            added_curvature=partial(_of_strip, bend, g, "run", last),
-        )
-        for label, parameters, g in over_runs(name, constant=True)
-    ]
-    about = "curvature of the unloaded strip that changes from run to run of a specimen"
-    yield _term(name, about, "rest_curvature", ("run",), forms)
+    yield strip_effect(name, about, "bending_moment", ("run",), forms)
+    for acts_on, unit, about in (
+        ("rest_curvature", bend, "curvature of the unloaded strip"),
+        ("load", 1.0, "weight"),
+    ):
+        name = f"{acts_on}_of_run"
+        forms = [
+            strip_form(
+                label,
+                parameters,
+                Shape("runs_before", Y[acts_on], last, partial(times, unit, g)),
+                acts_on,
+                partial(of_strip, unit, g, "run", last),
+            )
+            for label, parameters, g in over_runs(name, constant=acts_on == "rest_curvature")
+        ]
+        words = f"{about} that changes from run to run of a specimen"
+        yield strip_effect(name, words, acts_on, ("run",), forms)
 
 
 def _softened(g: Of, last: float, p: Values, at: Values) -> Any:
-    return _softer(_of_strip(1.0, g, "run", last, p, at), p, at)
+    return _softer(of_strip(1.0, g, "run", last, p, at), p, at)
 
 
 def _of_the_run(runs: Sequence[int]) -> Iterator[Effect]:
@@ -368,7 +359,7 @@ def _of_the_run(runs: Sequence[int]) -> Iterator[Effect]:
         value, points = partial(_of_its_run, each, last), tuple((k + 1) / last for k in runs)
         shape = Shape("run", "height_mm", last, value, points=points)
         forms = [StripVariant("zero", each, shape=shape, each_run=True)]
-        yield _term(name, "a zero of the heights in each run", "reading", ("run",), forms)
+        yield strip_effect(name, "a zero of the heights in each run", "reading", ("run",), forms)
 
 
 def _of_its_run(each: Sequence[Parameter], last: float, p: Values, x: Any) -> Any:
@@ -384,33 +375,9 @@ def _higher(
     return 0.0, added * (at["z"] if unit is None else unit)
 
 
-def _turned(turn: str, p: Values, at: Values) -> tuple[Any, Any]:
-    return -p[turn] * at["z"], p[turn] * at["x"]
-
-
 def _radial(names: tuple[str, str], longest: float, p: Values, at: Values) -> tuple[Any, Any]:
     square = (at["x"] ** 2 + at["z"] ** 2) / longest**2
     return p[names[0]] * at["x"] * square, p[names[1]] * at["z"] * square
-
-
-def _term(
-    name: str,
-    about: str,
-    acts_on: str,
-    depends_on: tuple[str, ...],
-    forms: Iterable[StripVariant],
-    general_form_of: tuple[str, ...] = (),
-) -> Effect:
-    return Effect(
-        name,
-        "cantilever",
-        about,
-        tuple(forms),
-        of_fabric=acts_on == "bending_moment",
-        acts_on=acts_on,
-        depends_on=depends_on,
-        general_form_of=general_form_of,
-    )
 
 
 def _from(label: str, end: str) -> str:

@@ -30,7 +30,8 @@ from ..records import shifted
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
 from .products import products
-from .terms import terms
+from .rig_products import rig_products
+from .terms import ranges_of, terms
 from .variant import FrameVariant
 
 __all__ = ["PictureFrame"]
@@ -83,7 +84,7 @@ class PictureFrame(CrossheadTest):
         if ranges["run_of_specimen"]:
             whole = self._past_of_specimens["path"] + self._paths
             ranges["path_of_specimen"] = float(whole[fitted].max())
-        return [*terms(ranges, self._ends()), *products(ranges)]
+        return [*terms(ranges, self._ends()), *products(ranges), *rig_products(ranges_of(ranges))]
 
     @property
     def one_curve(self) -> OneCurve | None:

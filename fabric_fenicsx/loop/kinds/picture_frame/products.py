@@ -15,7 +15,7 @@ from typing import Any
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import product_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .shapes import FORGETFUL, SQUARES, X, Y, fitted, remembered_since, shapes
+from .shapes import FORGETFUL, MOST, SQUARES, X, Y, fitted, remembered_since, shapes
 from .terms import as_reported, of_a_law, ranges_of, remembering
 from .variant import FrameVariant
 
@@ -44,9 +44,6 @@ class _Kind:
     constants: bool = False
     depends_on: tuple[str, ...] = ()
 
-
-#: Coefficients of a product; more of them, and other data are foretold by what cancels in these.
-MOST = 10
 
 HISTORIES = ("largest_angle", "path", "time")
 

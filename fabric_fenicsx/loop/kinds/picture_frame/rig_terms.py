@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
-from ufl import conditional, gt, max_value, min_value
+from ufl import conditional, exp, gt, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.law import size_of
 from ....mechanics.laws.shaped import recent, shape_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .shapes import Ends, X, Y, factor, fitted, memory_of, over_runs, shapes, wave, wealth
+from .shapes import Ends, X, Y, bumps, factor, fitted, memory_of, over_runs, shapes, waves, wealth
 from .variant import FrameVariant
 
-__all__ = ["RIG_VARIABLES", "RigVariable", "of_the_rig", "rig_terms"]
+__all__ = ["RIG_VARIABLES", "RigVariable", "of_the_rig", "rig_term", "rig_terms"]
 
 #: Most cycles over the range that a periodic term is looked for with.
 CYCLES = {"time": 40.0, "displacement": 16.0}
@@ -24,9 +24,12 @@ CYCLES = {"time": 40.0, "displacement": 16.0}
 SLOW = 1e-3
 #: Memories of what lags, as shares of the longest run: a filter's are short.
 LAGS = (0.003, 0.01, 0.05, 0.2)
+#: Ways over which a play is taken up, as shares of the largest displacement.
+PLAYS = (0.01, 0.05)
 
-Turning = Literal["", "at its rate", "kept in a hold"]
-"""Whether what is added has the sign of the motion, and what that is where nothing moves."""
+Turning = Literal["", "at its rate", "kept in a hold", "over a way"]
+"""Whether what is added has the sign of the motion, and what that is where nothing moves or, as of
+a play, where it has just turned."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,11 +106,20 @@ RIG: dict[str, dict[str, tuple[str, ...]]] = {
 }
 """What acts on the reading and the travel, and what its variable is called in a report."""
 
-AGAINST_THE_MOTION = ("displacement", "force")
-"""What a friction of the rig may depend on; the load cell reads it with the sign of the speed."""
+AGAINST_THE_MOTION = ("displacement", "force", "time", "run")
+"""What a friction or a play of the rig may depend on; it has the sign of the speed."""
 
-GAINS = ("time", "displacement", "run")
-"""What a load cell's gain may change with, beside the force."""
+WAYS: dict[str, tuple[Turning, ...]] = {
+    "reading": ("kept in a hold", "at its rate"),
+    "travel": ("over a way",),
+}
+"""How that turns: a frame that goes on at once would have to be infinitely fast."""
+
+OFTEN = (("reading", "displacement"), ("reading", "force"))
+"""Those that are looked at with terms over one variable."""
+
+GAINS = {"time": "time", "displacement": "displacement", "run": "run", "speed_size": "rate"}
+"""What a load cell's gain may change with, beside the force, and its name in a report."""
 
 LINES = ("force_rate", "acceleration", "force_lag", "displacement_lag")
 """Variables of which a term is a multiple."""
@@ -130,24 +142,26 @@ def rig_terms(largest: Mapping[str, float], ends: Ends) -> Iterator[Effect]:
                 forms += _forms(acts_on, name, "force_size", largest, ends, gain=True)
             if name == "reading_of_speed":
                 forms += _forms(acts_on, name, "speed_size", largest, ends, "at its rate")
-            yield _term(acts_on, name, reported, forms)
-    for variable in AGAINST_THE_MOTION:
-        name = f"reading_of_{variable}_and_direction"
-        ways: tuple[Turning, ...] = ("kept in a hold", "at its rate")
-        both = (f for way in ways for f in _forms("reading", name, variable, largest, ends, way))
-        yield _term("reading", name, (variable, "rate"), both)
-    for variable in GAINS:
-        if variable in largest:
-            name = f"reading_of_force_and_{variable}"
+            yield rig_term(acts_on, name, reported, forms)
+    for acts_on, ways in WAYS.items():
+        for variable in (v for v in AGAINST_THE_MOTION if v in largest):
+            name = f"{acts_on}_of_{variable}_and_direction"
+            of_all = (f for w in ways for f in _forms(acts_on, name, variable, largest, ends, w))
+            term = rig_term(acts_on, name, (variable, RIG[acts_on]["speed"][0]), of_all)
+            yield replace(term, of_two=(acts_on, variable) not in OFTEN)
+    for variable, by in GAINS.items():
+        if variable.removesuffix("_size") in largest:
+            name = f"reading_of_force_and_{by}"
             gains = _forms("reading", name, variable, largest, ends, gain=True)
-            term = _term("reading", name, ("force", variable), gains)
-            # By the displacement it is near to a moment by the angle.
-            yield replace(term, of_two=variable == "displacement")
+            term = rig_term("reading", name, ("force", by), gains)
+            # By the displacement or the speed it is near to a moment by the angle or its rate.
+            yield replace(term, of_two=by in ("displacement", "rate"))
 
 
-def _term(
+def rig_term(
     acts_on: str, name: str, depends_on: tuple[str, ...], forms: Iterable[FrameVariant]
 ) -> Effect:
+    """A term of forms that act on the rig."""
     about = f"what acts on the {acts_on}, by {' and '.join(depends_on)}"
     return Effect(
         name,
@@ -172,7 +186,7 @@ def _forms(
     """Forms of what is added."""
     reach = largest[variable.removesuffix("_size")]
     between = ends.get(variable.removeprefix("recent_"), (0.0, 1.0))
-    shapes_of = list(_gains(name, variable) if gain else _added(name, variable, turning))
+    shapes_of = list(_gains(name, variable) if gain else _added(name, variable, turning, between))
     if between[0] < 0.0 < between[1] and variable not in LINES and not gain:
         sides = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("odd", "even"))
         shapes_of.append(
@@ -187,11 +201,14 @@ def _forms(
             also["memory"] = memory_of(name, largest, *shares)
         if turning:
             also |= {"turning": turning, "slow": SLOW * largest["speed"]}
+        if turning == "over a way":
+            starts = tuple(share * largest["displacement"] for share in PLAYS)
+            also["way"] = Parameter(f"{name}_way_mm", starts, starts[0] / 10.0, 5.0 * starts[-1])
         if gain:
             label, also["gain"] = f"gain, {label}", True
         y = "share_of_reading" if gain else Y[acts_on]
         yield of_the_rig(
-            label if turning != "kept in a hold" else f"{label}, {turning}",
+            label if turning in ("", "at its rate") else f"{label}, {turning}",
             fitted(own | also),
             acts_on,
             variable,
@@ -199,6 +216,7 @@ def _forms(
             memory=also.get("memory", 0.0),
             turning=turning,
             slow=also.get("slow", 0.0),
+            way=also.get("way", 0.0),
             gain=gain,
             shape=Shape(X[variable], y, reach, partial(factor, own), own | also, between),
         )
@@ -214,12 +232,14 @@ def of_the_rig(
     parameters: tuple[Parameter, ...],
     acts_on: str,
     variable: str,
-    added: Callable[[Values, Any], Any],
+    added: Callable[..., Any],
     *,
     memory: Any = 0.0,
     turning: Turning = "",
     slow: float = 0.0,
+    way: Any = 0.0,
     gain: bool = False,
+    also: str = "",
     shape: Shape | None = None,
 ) -> FrameVariant:
     """A form of something that acts on the rig.
@@ -229,18 +249,27 @@ def of_the_rig(
         parameters: its numbers.
         acts_on: "reading" [N] or "travel" [mm].
         variable: one of RIG_VARIABLES.
-        added: what is added, from the parameters and the variable.
+        added: what is added, from the parameters, the variable and ``also``, if there is one.
         memory: τ of a variable that forgets [s], or the parameter that is one.
         turning: whether that is times the sign of the speed; "kept in a hold" is as it was before,
-            as of a friction that sticks, "at its rate" nothing.
+            as of a friction that sticks, "at its rate" nothing; "over a way" it turns as the
+            crosshead goes on.
         slow: speed below which its sign is rounded, or it holds [mm/s].
+        way: over which it turns [mm], or the parameter that is one.
         gain: whether it is a share of the force that is added.
+        also: another variable, one that does not remember.
         shape: of a term without a formula.
     """
     kind = RIG_VARIABLES[variable]
+    others = [RIG_VARIABLES[also]] if also else []
     remembered: Callable[[Values, Values, Any], Any] | None = None
     if turning == "kept in a hold":
         remembered = partial(_last_way, slow)
+    elif turning == "over a way":
+
+        def remembered(p: Values, at: Values, past: Any) -> Any:
+            return _turned_over(valued(way, p), at, past)
+
     elif kind.remembered is not None:
         own = kind.remembered
 
@@ -248,18 +277,20 @@ def of_the_rig(
             return own(at, past, valued(memory, p))
 
     def whole(p: Values, at: Values) -> Any:
-        size = added(p, kind.value(at))
+        size = added(p, kind.value(at), *(other.value(at) for other in others))
         if gain:
             return at["force"] * size
-        if turning == "kept in a hold":
+        if turning in ("kept in a hold", "over a way"):
             return size * at["memory"]
         return size * shape_of("sign", (1.0,), at["speed"], width=slow) if turning else size
 
+    of = [*kind.of, *(name for other in others for name in other.of)]
+    of += ["per_time"] * (turning == "over a way")
     return FrameVariant(
         label,
         parameters,
         shape=shape,
-        of=tuple(dict.fromkeys((*kind.of, *["force"] * gain, *["speed"] * bool(turning)))),
+        of=tuple(dict.fromkeys((*of, *["force"] * gain, *["speed"] * bool(turning)))),
         remembered=remembered,
         variable=kind.value if kind.remembered is not None else None,
         added_reading=whole if acts_on == "reading" else None,
@@ -279,12 +310,22 @@ def _gains(name: str, variable: str) -> Iterator[tuple[str, dict[str, Any]]]:
         if label in chosen or not chosen:
             top = {"from_the_top": True} if of_the_force else {}
             yield label, numbers | {"coefficients": coefficients} | top
+    if variable == "time":
+        for label, coefficients, numbers in waves(name, CYCLES["time"], (0, 2)):
+            yield label, numbers | {"coefficients": coefficients}
 
 
 def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
     """The sign of the speed, and of the last one where there is none."""
     way = conditional(gt(at["speed"], 0), 1.0, -1.0)
     return conditional(gt(size_of(at["speed"]), slow), way, past)
+
+
+def _turned_over(way: Any, at: Values, past: Any) -> Any:
+    """From the one sign to the other along e^(−ΔD/way), and as it was in a hold."""
+    step = at["speed"] / (at["per_time"] * way)
+    kept, sign = exp(-size_of(step)), conditional(gt(step, 0), 1.0, -1.0)
+    return kept * past + (1 - kept) * sign
 
 
 def _zero(name: str, turning: Turning) -> dict[str, Parameter]:
@@ -294,7 +335,9 @@ def _zero(name: str, turning: Turning) -> dict[str, Parameter]:
     return {}
 
 
-def _added(name: str, variable: str, turning: Turning) -> Iterator[tuple[str, dict[str, Any]]]:
+def _added(
+    name: str, variable: str, turning: Turning, between: tuple[float, float]
+) -> Iterator[tuple[str, dict[str, Any]]]:
     """Label and numbers of shapes."""
     one = (Parameter(f"{name}_1", amplitude=True),)
     if variable == "speed_size":
@@ -312,11 +355,17 @@ def _added(name: str, variable: str, turning: Turning) -> Iterator[tuple[str, di
         if name.startswith("travel"):
             return
     constant = _zero(name, turning)
-    few = 2 if turning == "kept in a hold" else wealth(name.partition("_")[0], variable)
+    few = (
+        2
+        if turning in ("kept in a hold", "over a way")
+        else wealth(name.partition("_")[0], variable)
+    )
     for label, coefficients, numbers in over_runs(name) if variable == "run" else shapes(name, few):
         yield label, numbers | {"coefficients": coefficients} | constant
     if variable in ("time", "displacement") and not turning:
-        label, waves, numbers = wave(name, CYCLES[variable])
+        for label, coefficients, numbers in bumps(name, between):
+            yield label, numbers | {"coefficients": coefficients} | constant
         # Where a run begins a wave may be anywhere.
         zero = {"constant": Parameter(f"{name}_0", amplitude=True)}
-        yield label, numbers | {"coefficients": waves} | zero
+        for label, coefficients, numbers in waves(name, CYCLES[variable]):
+            yield label, numbers | {"coefficients": coefficients} | zero

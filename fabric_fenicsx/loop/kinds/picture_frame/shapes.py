@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,18 +12,21 @@ from ....mechanics.laws.shaped import GRADED, shape_of
 from ...inference.effects import Values, valued
 
 __all__ = [
+    "FINE",
     "FORGETFUL",
+    "MOST",
     "SQUARES",
     "Ends",
     "X",
     "Y",
+    "bumps",
     "factor",
     "fitted",
     "memory_of",
     "over_runs",
     "remembered_since",
     "shapes",
-    "wave",
+    "waves",
     "wealth",
 ]
 
@@ -33,12 +36,16 @@ SPLINES = (1, 2, 3, 5, 9)
 FINE = (("odd", "angle"), ("even", "angle"), ("reading", "displacement"), ("reading", "force"))
 #: Where a step may begin to be looked for, as a share of the range, and how wide it is.
 PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
+#: Likewise of a bump.
+BUMPS, BUMP_WIDTHS = tuple((0.05 + 0.1 * np.arange(10)).tolist()), (0.03, 0.12)
 #: Decays, as shares of the range.
 DECAYS = (0.1, 0.3)
 #: Where a logarithm bends over, as shares of it.
 BENDS = (0.01, 0.1)
 #: Steps of how many cycles a wave is looked for with: closer together two are alike.
 STEP = 0.5
+#: Coefficients of a product; more of them, and other data are foretold by what cancels in these.
+MOST = 10
 #: Memories, as shares of the longest run.
 MEMORIES = (0.01, 0.05, 0.2)
 
@@ -162,12 +169,37 @@ def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...],
         yield "logarithm", one, {"shape": "logarithm", "width": bend}
 
 
-def wave(name: str, most: float) -> tuple[str, tuple[Parameter, ...], dict[str, Any]]:
-    """A wave: as a shape. With at most so many cycles over the range."""
-    own = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("sine", "cosine"))
+def waves(
+    name: str, most: float, overtones: Sequence[int] = (0,)
+) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
+    """Waves with at most so many cycles over the range, and so many overtones each: as shapes."""
     periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
     period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
-    return "periodic", own, {"shape": "periodic", "width": period}
+    for more in overtones:
+        own = [
+            Parameter(f"{name}_{of}{k + 1 if k else ''}", amplitude=True)
+            for k in range(more + 1)
+            for of in ("sine", "cosine")
+        ]
+        label = "periodic" + (f", {more} overtones" if more else "")
+        yield label, tuple(own), {"shape": "periodic", "width": period}
+
+
+def bumps(
+    name: str, ends: tuple[float, float] = (0.0, 1.0)
+) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
+    """What is at one place alone, on one side of it or on both: as shapes.
+
+    Args:
+        name: of the term.
+        ends: between which shares of the range places are.
+    """
+    own = tuple(Parameter(f"{name}_{of}", amplitude=True) for of in ("there", "across"))
+    low, high = ends
+    places = tuple(low + (high - low) * share for share in BUMPS)
+    place = Parameter(f"{name}_place", places, low, high)
+    width = Parameter(f"{name}_width", BUMP_WIDTHS, 0.005, 0.5)
+    yield "bump", own, {"shape": "bump", "place": place, "width": width}
 
 
 def over_runs(name: str) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:

@@ -22,17 +22,19 @@ from ...inference.effects import Effect, Shape, Values, valued
 from ..records import FEWEST_BEFORE
 from .rig_terms import rig_terms
 from .shapes import (
+    FINE,
     FORGETFUL,
     Ends,
     X,
     Y,
+    bumps,
     factor,
     fitted,
     memory_of,
     over_runs,
     remembered_since,
     shapes,
-    wave,
+    waves,
     wealth,
 )
 from .variant import FrameVariant
@@ -41,8 +43,18 @@ __all__ = ["as_reported", "of_a_law", "of_the_run", "ranges_of", "remembering", 
 
 #: Angles in which a friction begins to slide [rad].
 STICKS = (0.005, 0.03)
-#: Most cycles of a moment over the angles, as of tows that ride over each other's crimp.
-CYCLES = 8.0
+#: Powers of a moment that a flow is in proportion to: between a dashpot's 1 and a yield's many.
+EXPONENTS = (2.0, 8.0)
+#: Most cycles of a moment over the angles, as of tows that ride over each other's crimp, and over
+#: the time, as of a room that is warmed now and then.
+CYCLES = {
+    ("odd", "angle"): 8.0,
+    ("elastic", "time"): 40.0,
+    ("viscous", "time"): 40.0,
+    ("dissipative", "time"): 40.0,
+}
+#: In time nothing need be a sine: what is switched is not.
+OVERTONES = {"time": (0, 2)}
 
 
 def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> list[Effect]:
@@ -58,7 +70,8 @@ def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> lis
         ends: of those that may be negative.
     """
     largest = ranges_of(ranges)
-    return [*_of_the_crossing(largest), *_by_run(largest), *rig_terms(largest, ends)]
+    of_the_crossing = (*_of_the_crossing(largest), *_flowing(largest), *_by_run(largest))
+    return [*of_the_crossing, *rig_terms(largest, ends)]
 
 
 def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
@@ -104,6 +117,33 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
                 acts_on="moment",
                 depends_on=depends_on,
             )
+
+
+def _flowing(largest: Mapping[str, float]) -> Iterator[Effect]:
+    """What flows under the moment that is on it: what that was is all that it remembers."""
+    for by in ("", "angle"):
+        name = "flowing_moment_of_" + ("angle_and_history" if by else "history")
+        exponent = Parameter(f"{name}_exponent", EXPONENTS, 1.2, 40.0)
+        fixed = {"base": "flowing", "variable": "angle", "reach": largest["angle"]}
+        fixed |= {"flow_rate": largest["rate"], "exponent": exponent}
+        fixed |= remembering(name, "flowing", "angle", largest)
+        fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
+        alike: tuple[Parameter, ...] = ()
+        drawn = [*shapes(name, 2)][:2] if by else [("at all angles", alike, {"shape": "spline"})]
+        forms = [
+            _law_form(label, own)
+            for label, coefficients, numbers in drawn
+            for own in [fixed | numbers | {"coefficients": coefficients}]
+        ]
+        yield Effect(
+            name,
+            "picture_frame",
+            "moment that flows" + (", by the angle" if by else ""),
+            tuple(forms),
+            acts_on="moment",
+            depends_on=(by, "history") if by else ("history",),
+            of_two=bool(by),
+        )
 
 
 def _by_run(largest: Mapping[str, float]) -> Iterator[Effect]:
@@ -218,27 +258,36 @@ def _laws(
     fixed |= remembering(name, base, variable, largest)
     if base in (*FRICTION, *ALIKE["outward"]):
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
-    of_baseline = ("k1_N", "k3_N") if base in OF_ELASTIC else ()
     also = f", {base}" if base in ("smooth", "forward") else ""
     drawn = [*shapes(name, wealth(base, variable))]
-    if (base, variable) == ("odd", "angle"):
-        drawn.append(wave(name, CYCLES))
+    if (base, variable) in FINE:
+        drawn += bumps(name)
+    if (base, variable) in CYCLES:
+        drawn += waves(name, CYCLES[base, variable], OVERTONES.get(variable, (0,)))
     for label, coefficients, numbers in drawn:
         first: FrameVariant | None = None
         for carried, reach, words in remembered_since(variable, largest):
             own = fixed | numbers | {"reach": reach, "coefficients": coefficients}
-            value = partial(factor, own)
-            form = FrameVariant(
-                f"{words}, {label}{also}",
-                fitted(own),
-                shape=Shape(X[variable], Y.get(base, "moment_N"), reach, value, own),
-                laws=partial(of_a_law, own),
-                carried=carried,
-                like=first if reach == largest[variable] else None,
-                of_baseline=of_baseline,
-            )
+            like = first if reach == largest[variable] else None
+            form = _law_form(f"{words}, {label}{also}", own, carried, like)
             first = first or form
             yield form
+
+
+def _law_form(
+    label: str, own: Mapping[str, Any], carried: str = "", like: FrameVariant | None = None
+) -> FrameVariant:
+    """A form of a law over one variable, from its numbers."""
+    variable, base = own["variable"], own["base"]
+    return FrameVariant(
+        label,
+        fitted(own),
+        shape=Shape(X[variable], Y.get(base, "moment_N"), own["reach"], partial(factor, own), own),
+        laws=partial(of_a_law, own),
+        carried=carried,
+        like=like,
+        of_baseline=("k1_N", "k3_N") if base in OF_ELASTIC else (),
+    )
 
 
 def of_a_law(numbers: Mapping[str, Any], values: Values) -> tuple[ShapedLaw, ...]:

@@ -1,0 +1,103 @@
+"""Terms without a formula of a strip over two variables together.
+
+One is a place along the strip, or a place or a height in the picture, and enters in proportion; of
+the other, the run or the overhang, there is a shape g as of terms over one variable:
+
+    (x, z) + g (−z, x),  z + x g,  z (1 + g)    what the camera sees
+    κ0 = s g,  w (1 + s g)                      the curvature of the unloaded strip, and its weight
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any
+
+from ...inference.effects import Effect, Shape, Values
+from ..records import FEWEST_BEFORE
+from .shapes import SPLINES, Drawn, Of, over_runs, splines
+from .term import X, Y, of_strip, strip_effect, strip_form, times, turned
+from .variant import StripVariant
+
+__all__ = ["products"]
+
+CALLED = {"run": "run", "length": "overhang"}
+"""Variables in words."""
+
+
+def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
+    """The terms.
+
+    Args:
+        ranges: see ``terms``; without two "runs" before one there are none by the run.
+    """
+    yield from _turned_by("length", ranges["length"], partial(splines, counts=SPLINES))
+    last = ranges.get("runs", 0.0)
+    if last < FEWEST_BEFORE:
+        return
+    yield from _turned_by("run", last, over_runs)
+    name = "reading_of_height_and_run"
+    forms = [
+        StripVariant(
+            label,
+            parameters,
+            shape=Shape(X["run"], "share_of_height", last, g),
+            camera=partial(_scaled, g, "run", last),
+        )
+        for label, parameters, g in over_runs(name)
+    ]
+    about = "scale of heights that changes from run to run"
+    yield strip_effect(name, about, "reading", ("height", "run"), forms, of_two=True)
+    for acts_on, unit, what in (
+        ("rest_curvature", ranges["curvature"], "curvature of the unloaded strip"),
+        ("load", 1.0, "weight"),
+    ):
+        name = f"{acts_on}_of_arc_length_and_run"
+        forms = [
+            strip_form(
+                label,
+                parameters,
+                # At the end of the longest strip.
+                Shape(X["run"], Y[acts_on], last, partial(times, unit, g)),
+                acts_on,
+                partial(_along, unit, g, last, ranges["length"]),
+            )
+            for label, parameters, g in over_runs(name)
+        ]
+        about = f"{what} that changes along the strip and from run to run"
+        yield strip_effect(name, about, acts_on, ("arc_length", "run"), forms, of_two=True)
+
+
+def _turned_by(
+    variable: str, most: float, drawn: Callable[[str], Iterator[Drawn]]
+) -> Iterator[Effect]:
+    name = f"reading_of_distance_and_{variable}"
+    forms = [
+        StripVariant(
+            f"{words}, {label}",
+            parameters,
+            shape=Shape(X[variable], "turn_rad", most, g),
+            camera=partial(seen, g, variable, most),
+        )
+        for words, seen in (("turned", _turned), ("sheared", _sheared))
+        for label, parameters, g in drawn(name)
+    ]
+    about = f"a camera that is turned more or less by the {CALLED[variable]}"
+    yield strip_effect(name, about, "reading", ("distance", variable), forms, of_two=True)
+
+
+def _turned(g: Of, by: str, most: float, p: Values, at: Values) -> tuple[Any, Any]:
+    return turned(of_strip(1.0, g, by, most, p, at), at)
+
+
+def _sheared(g: Of, by: str, most: float, p: Values, at: Values) -> tuple[Any, Any]:
+    """As by a camera that looks from one side; lines that were upright stay so."""
+    return 0.0, of_strip(1.0, g, by, most, p, at) * at["x"]
+
+
+def _scaled(g: Of, by: str, most: float, p: Values, at: Values) -> tuple[Any, Any]:
+    return 0.0, of_strip(1.0, g, by, most, p, at) * at["z"]
+
+
+def _along(unit: float, g: Of, last: float, longest: float, p: Values, at: Values) -> Any:
+    return at["s"] / longest * of_strip(unit, g, "run", last, p, at)

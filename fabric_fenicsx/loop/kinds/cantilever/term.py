@@ -1,0 +1,77 @@
+"""What every term of a strip is made with: its effect, its forms, and what a shape does there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from ufl import min_value
+
+from ....inputs.parameters import Parameter
+from ...inference.effects import Effect, Shape, Values
+from .shapes import Of
+from .variant import StripVariant
+
+__all__ = ["X", "Y", "of_strip", "strip_effect", "strip_form", "times", "turned"]
+
+X = {
+    "clamp": "arc_length_mm",
+    "free end": "from_the_free_end_mm",
+    "length": "length_mm",
+    "run": "runs_before",
+    "x": "distance_mm",
+    "z": "height_mm",
+}
+Y = {"rest_curvature": "rest_curvature_1_mm", "load": "share_of_weight"}
+"""Variables and what is added, with units."""
+
+
+def strip_effect(
+    name: str,
+    about: str,
+    acts_on: str,
+    depends_on: tuple[str, ...],
+    forms: Iterable[StripVariant],
+    general_form_of: tuple[str, ...] = (),
+    of_two: bool = False,
+) -> Effect:
+    """A term of its forms."""
+    return Effect(
+        name,
+        "cantilever",
+        about,
+        tuple(forms),
+        of_fabric=acts_on == "bending_moment",
+        acts_on=acts_on,
+        depends_on=depends_on,
+        general_form_of=general_form_of,
+        of_two=of_two,
+    )
+
+
+def strip_form(
+    label: str,
+    parameters: tuple[Parameter, ...],
+    shape: Shape,
+    acts_on: str,
+    of: Callable[[Values, Values], Any],
+) -> StripVariant:
+    """A form that adds to the "load" or to the "rest_curvature"."""
+    if acts_on == "load":
+        return StripVariant(label, parameters, shape=shape, load=of)
+    return StripVariant(label, parameters, shape=shape, added_curvature=of)
+
+
+def times(unit: float, g: Of, p: Values, x: Any) -> Any:
+    """So many units."""
+    return unit * g(p, x)
+
+
+def of_strip(unit: float, g: Of, by: str, most: float, p: Values, at: Values) -> Any:
+    """Of what is the same all along a strip, its "length" or its "run"."""
+    return unit * g(p, min_value(at[by] / most, 1))
+
+
+def turned(angle: Any, at: Values) -> tuple[Any, Any]:
+    """What a camera adds to (x, z) that is turned by an angle [rad], a small one."""
+    return -angle * at["z"], angle * at["x"]
