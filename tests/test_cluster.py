@@ -85,7 +85,11 @@ before = dict(os.environ)
 from fabric_fenicsx.parallel import world
 assert world().size == 2 and dict(os.environ) == before
 parts = open("/proc/self/maps").read()
-print(*(name for name in ("vader", "tcp", "ofi") if f"mca_btl_{name}.so" in parts))
+used = [name for name in ("vader", "tcp", "ofi") if f"mca_btl_{name}.so" in parts]
+found = world().gather(used)
+# By one rank: lines of several may run into each other.
+if found:
+    print(*(name for names in found for name in names))
 """
 
 
