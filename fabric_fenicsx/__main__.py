@@ -37,6 +37,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     from .errors import InputError, SolveError
     from .parallel import launched, rank
 
+    if launched():
+        # Of Mesa, which draws for VTK: other ranks draw beside this one.
+        os.environ.setdefault("LP_NUM_THREADS", "0")
     if rank() != 0:
         sys.stdout = open(os.devnull, "w")
     try:

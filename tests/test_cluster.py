@@ -77,3 +77,35 @@ def test_a_process_alone_leaves_no_setting_to_those_it_starts(given):
     code += "assert world().size == 1; assert dict(os.environ) == b"
     env = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
     subprocess.run([sys.executable, "-c", code], env=env | given, check=True, timeout=60)
+
+
+BETWEEN_RANKS = """
+import os
+before = dict(os.environ)
+from fabric_fenicsx.parallel import world
+assert world().size == 2 and dict(os.environ) == before
+parts = open("/proc/self/maps").read()
+used = [name for name in ("vader", "tcp", "ofi") if f"mca_btl_{name}.so" in parts]
+found = world().gather(used)
+# By one rank: lines of several may run into each other.
+if found:
+    print(*(name for names in found for name in names))
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "used"),
+    [({}, "vader"), ({"OMPI_MCA_btl": "^tcp"}, "vader"), ({"OMPI_MCA_btl": "self,tcp"}, "tcp")],
+)
+def test_ranks_of_one_machine_open_no_network_unless_one_is_named(given, used):
+    """OFI's sleeps for a second when it is closed; a list of what is not to be used names none."""
+    version = subprocess.run(["mpirun", "--version"], capture_output=True, text=True, check=True)
+    if "(Open MPI) 4." not in version.stdout:
+        pytest.skip("another MPI has its networks elsewhere")
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    env = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    done = subprocess.run(
+        ["mpirun", "--oversubscribe", "-n", "2", sys.executable, "-c", BETWEEN_RANKS],
+        env=env | allowed | given, capture_output=True, text=True, check=True, timeout=60,
+    )  # fmt: skip
+    assert done.stdout.split() == [used, used]

@@ -87,7 +87,8 @@ class Record:
         self._table = folder / "steps.csv"
         self._root, self._keeper = model.comm.rank == 0, neighbour(model.comm)
         self._columns: list[str] = []
-        self._seen: dict[str, npt.NDArray[np.float64]] = {}
+        # The step that was looked at last, and where the tools are in it.
+        self._seen: tuple[Snapshot, dict[str, npt.NDArray[np.float64]]]
         if self._root:
             self._open(resume_at)
             (folder / "case.yaml").unlink(missing_ok=True)
@@ -128,7 +129,7 @@ class Record:
         return rows
 
     def observe(self, step: Step, measure: Callable[[Snapshot], dict[str, float]]) -> Snapshot:
-        """Write what is seen of a converged step: energies, tool forces, the ParaView files."""
+        """Look at a converged step, and write its row: energies, tool forces."""
         model = self.model
         outside = model.outside()
         snapshot = model.snapshot(step.time, outside)
@@ -145,10 +146,8 @@ class Record:
             row[f"{tool}_penetration_mm"] = max(0.0, -float(gap.min()))
         row |= measure(snapshot)
         self.recent.append(row)
-        places = {tool.name: model.tool_place(tool.name) for tool in model.tools}
-        self._seen = seen_arrays(snapshot, places)
+        self._seen = snapshot, {tool.name: model.tool_place(tool.name) for tool in model.tools}
         if self._root:
-            self._series.add(snapshot, places)
             # A table that goes on keeps the columns that it began with.
             self._columns = self._columns or list(row)
             begun = self._table.exists()
@@ -157,7 +156,10 @@ class Record:
         return snapshot
 
     def keep(self, step: Step, stepper: Stepper) -> None:
-        """Write the accepted state, and what `observe` has seen of it."""
+        """Write the accepted state, and what `observe` has seen of it in there and for ParaView.
+
+        ParaView's files are rank 0's and the state is its neighbour's, at the same time.
+        """
         model, state, predictor = self.model, stepper.state, stepper.predictor
         disc = model.disc
         n = disc.owned
@@ -172,6 +174,8 @@ class Record:
         together = np.hstack([values[:n] for values in arrays.values()])
         whole = disc.gather_nodes(together, to=self._keeper)
         histories = model.histories.save(to=self._keeper)
+        if self._root:
+            self._series.add(*self._seen)
         if model.comm.rank == self._keeper:
             scalars = {
                 "schema": STEP_SCHEMA,
@@ -185,7 +189,7 @@ class Record:
             parts = np.hsplit(whole, np.cumsum([STATE[name] for name in arrays])[:-1])
             written = {name: np.asarray(value) for name, value in scalars.items()}
             written |= dict(zip(arrays, parts, strict=True))
-            written |= self._seen
+            written |= seen_arrays(*self._seen)
             written |= {f"history: {name}": values for name, values in histories.items()}
             path = self.steps / f"step_{step.number:05d}.npz"
             write_npz(path, written, compressed=False, durable=True)
