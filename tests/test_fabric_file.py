@@ -8,6 +8,7 @@ and the standard error of a force is the one that follows from those of the para
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 from mpi4py import MPI
 
@@ -20,8 +21,10 @@ from test_shear_laws import moments
 
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.errors import InputError
+from fabric_fenicsx.loop import fabric as fabric_of
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.fabric import law_entries
+from fabric_fenicsx.loop.kinds.drape.effects import DRAPE_EFFECTS
 from fabric_fenicsx.loop.kinds.picture_frame.effects import PICTURE_FRAME_EFFECTS
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.measurement.schema import Run
@@ -507,3 +510,14 @@ def test_what_is_of_the_rig_is_named_and_left_out(tmp_path):
     assert file.crossover.laws == []
     assert file.crossover.k1_N_mm == pytest.approx(found.diagnoses[0].final.values["k1_N"])
     assert json.loads((tmp_path / "out" / "report.json").read_text())["verdict"] == "effect_found"
+
+
+def test_what_changes_a_drape_s_rig_is_no_key_of_the_fabric(monkeypatch):
+    """A holder that is pushed and rubs: its force is the effect's, as friction is the tools'."""
+    monkeypatch.setattr(fabric_of, "correlation_of", lambda model, names: np.zeros((0, 0)))
+    monkeypatch.setattr(fabric_of, "scatter", lambda model: {})
+    (effect,) = (e for e in DRAPE_EFFECTS if e.name == "holder_pressure")
+    part = fabric_of._Part("drape")
+    model = SimpleNamespace(values={"holder_force_N": 300.0}, at_bound=())
+    fabric_of._add_fitted(part, model, [(effect, effect.variants[0])], Path())
+    assert (part.tow, part.crossover, part.parameters) == ({}, {}, [])

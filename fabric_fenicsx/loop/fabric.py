@@ -314,6 +314,8 @@ def _add_fitted(
             keys[name], of[name] = {BASELINE[name]: 1.0}, ("baseline", "")
     laws: list[dict[str, Any]] = []
     for effect, variant in effects:
+        if not effect.of_fabric:
+            continue
         changes = getattr(variant, "changes", None)
         if changes is not None and model.values[variant.parameters[0].name] > 0.0:
             (p,) = variant.parameters
@@ -325,7 +327,7 @@ def _add_fitted(
             slopes_of = {_of_file(k): _slope(above[k], below[k], 2.0 * h) for k in above}
             keys[p.name] = {k: slope for k, slope in slopes_of.items() if slope}
             of[p.name] = (effect.name, variant.label)
-        if not effect.of_fabric or getattr(variant, "laws", None) is None:
+        if getattr(variant, "laws", None) is None:
             continue
         entries, slopes = law_entries(variant, model.values, folder)
         nothing = [p.name for p in variant.amplitudes if p.one_sided and p.name in model.at_bound]
