@@ -5,6 +5,10 @@ the other, the run or the overhang, there is a shape g as of terms over one vari
 
     (x, z) + g (−z, x),  z + x g,  z (1 + g)    what the camera sees
     κ0 = s g,  w (1 + s g)                      the curvature of the unloaded strip, and its weight
+
+What acts on the strip is for where no term over one variable will do. What the camera does is
+looked at with these: a zero of each run, which has as many numbers as there are runs, may otherwise
+stand for it.
 """
 
 from __future__ import annotations
@@ -47,7 +51,7 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
         for label, parameters, g in over_runs(name)
     ]
     about = "scale of heights that changes from run to run"
-    yield strip_effect(name, about, "reading", ("height", "run"), forms, of_two=True)
+    yield strip_effect(name, about, "reading", ("height", "run"), forms)
     for acts_on, unit, what in (
         ("rest_curvature", ranges["curvature"], "curvature of the unloaded strip"),
         ("load", 1.0, "weight"),
@@ -83,7 +87,7 @@ def _turned_by(
         for label, parameters, g in drawn(name)
     ]
     about = f"a camera that is turned more or less by the {CALLED[variable]}"
-    yield strip_effect(name, about, "reading", ("distance", variable), forms, of_two=True)
+    yield strip_effect(name, about, "reading", ("distance", variable), forms)
 
 
 def _turned(g: Of, by: str, most: float, p: Values, at: Values) -> tuple[Any, Any]:

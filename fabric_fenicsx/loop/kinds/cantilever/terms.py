@@ -305,9 +305,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
 
     name = "reading_of_length"
     forms = [
-        form(*shape, "length", to)
-        for to in ("scale", "height")
-        for shape in splines(name, SPLINES[:1])
+        form(*shape, "length", to) for to in ("scale", "height") for shape in splines(name, SPLINES)
     ]
     yield strip_effect(
         name, "heights, or their scale, by the overhang", "reading", ("length",), forms
