@@ -334,6 +334,14 @@ def test_terms_over_two_variables_remember_earlier_runs_as_well(tmp_path):
     assert {*several} == {"", "path", "largest_angle"}
 
 
+def test_a_table_of_a_shape_has_a_column_for_each(tmp_path):
+    """Its variables, what it is there, and the standard error of that."""
+    for term in write(tmp_path / "set", wearing_spring, MORE).terms:
+        for shape in (v.shape for v in term.variants if v.shape is not None):
+            columns = [shape.also, shape.x, shape.y, f"std_{shape.y}"]
+            assert len(set(columns)) == 4, term.name
+
+
 def test_two_runs_have_no_term_by_the_run(tmp_path):
     """What two runs differ by is a line whatever it is."""
     few = {"a": PROGRAMME, "b": PROGRAMME[::-1][1:]}

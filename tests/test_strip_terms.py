@@ -218,6 +218,17 @@ def test_derivatives_of_every_term(arc):
             assert np.abs(along - difference).max() < allowed, (effect.name, v.label)
 
 
+def test_a_table_of_a_shape_has_a_column_for_each():
+    """Its variables, what it is there, and the standard error of that."""
+    lengths = (LENGTH, 150.0, 200.0, LENGTH, 150.0)
+    one = strips(lengths, count=12)
+    experiment = Cantilever([replace(one, runs=tuple(replace(r, specimen="S") for r in one.runs))])
+    for term in experiment.terms:
+        for shape in (v.shape for v in term.variants if v.shape is not None):
+            columns = [shape.also, shape.x, shape.y, f"std_{shape.y}"]
+            assert len(set(columns)) == 4, term.name
+
+
 def test_zero_of_a_run_that_is_not_fitted_comes_from_that_run():
     zeros = (1.0, -2.0, 3.0)
     plain = strips((LENGTH, 150.0, 200.0), count=8)

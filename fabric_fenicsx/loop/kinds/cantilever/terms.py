@@ -269,7 +269,8 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         # What is added to a height is a factor of it, or so many times the deepest one.
         unit = None if to == "scale" else depth
         camera = partial(_higher, of, by, most, unit)
-        y = "share_of_height" if unit is None else "height_mm"
+        # In a table they stand beside each other.
+        y = "share_of_height" if unit is None else "added_height_mm" if by == "z" else "height_mm"
         names = {"x": "distance_mm", "z": "height_mm", "length": "length_mm"}
         shape = Shape(names[by], y, most, partial(times, unit or 1.0, of))
         return StripVariant(f"{to}, {label}", parameters, shape=shape, camera=camera)
