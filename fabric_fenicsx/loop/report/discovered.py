@@ -235,8 +235,10 @@ def _shortest(table: pd.DataFrame) -> str:
                 best = (len(found), off, text)
     if best is None:
         return f"f({v}), no short formula"
-    constant = f"{start:.3g} + " if abs(start) > SHARE * size else ""
-    return f"({constant}{best[2]})"
+    if abs(start) <= SHARE * size:
+        return f"({best[2]})"
+    sign, text = ("−", best[2][1:]) if best[2].startswith("-") else ("+", best[2])
+    return f"({start:.3g} {sign} {text})"
 
 
 def discovered_report(d: Diagnosis, terms: Sequence[Discovered]) -> list[dict[str, Any]]:

@@ -51,9 +51,12 @@ def discovered_figure(diagnosis: Diagnosis, term: Discovered) -> Figure:
     if len(table.columns) > 3:
         other = table.columns[0]
         levels = np.unique(table[other])[:: len(np.unique(table[other])) // LEVELS][1:]
+        # Where they are furthest apart their numbers can be told from each other.
+        grid = table.pivot(index=x, columns=other, values=y)[levels].to_numpy()
+        apart = int(np.argmax(np.ptp(grid, axis=1)))
         for level in levels:
             one = table[table[other] == level]
-            _band(axes, one, f" {level:.2g}")
+            _band(axes, one, f" {level:.2g}", apart)
         title += f", at each {other}"
         axes.margins(x=0.1)
     else:
@@ -67,12 +70,12 @@ def discovered_figure(diagnosis: Diagnosis, term: Discovered) -> Figure:
     return figure
 
 
-def _band(axes: Axes, table: pd.DataFrame, label: str = "") -> None:
-    """A shape over its last variable with its band, and a word at its end."""
+def _band(axes: Axes, table: pd.DataFrame, label: str = "", place: int = -1) -> None:
+    """A shape over its last variable with its band, and a word at one of its points."""
     x, y, std = (table[column] for column in table.columns[-3:])
     axes.fill_between(x, y - 2.0 * std, y + 2.0 * std, color=FAINT)
     axes.plot(x, y, color=AFTER)
-    axes.annotate(label, (x.iloc[-1], y.iloc[-1]), fontsize=7, va="center")
+    axes.annotate(label, (x.iloc[place], y.iloc[place]), fontsize=7, va="center")
 
 
 def _nearest_rival(d: Diagnosis, term: Discovered) -> tuple[str, Variant, Fit] | None:
