@@ -24,9 +24,9 @@ in the environment, which is meant for ranks: one alone has nobody to reach by a
 
 
 TOGETHER = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self,vader"}
-"""Of Open MPI, for ranks of one machine: through its memory, without a look at networks, which take
-0.2 s to be opened and one (OFI's) a whole second to be closed. What the environment names stays; a
-list of what is not to be used (``^tcp``) names nothing."""
+"""Of Open MPI 4, for ranks of one machine: through its memory, without a look at networks, which
+take 0.2 s to be opened and one (OFI's) a whole second to be closed. What the environment names
+stays; a list of what is not to be used (``^tcp``) names nothing."""
 
 
 def launched() -> bool:
@@ -40,7 +40,12 @@ def rank() -> int:
 
 
 def on_one_machine() -> bool:
-    """Whether mpirun, an Open MPI's, has started all ranks on this machine."""
+    """Whether mpirun, an Open MPI 4's, has started all ranks on this machine.
+
+    Later ones have another runtime (PRRTE), other names and no network that sleeps.
+    """
+    if not any(name.startswith("OMPI_MCA_orte_") for name in os.environ):
+        return False
     sizes = [os.environ.get(f"OMPI_COMM_WORLD_{name}SIZE") for name in ("", "LOCAL_")]
     return sizes[0] is not None and sizes[0] == sizes[1]
 
