@@ -17,7 +17,7 @@ from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.rig_terms import of_the_rig
 from fabric_fenicsx.loop.own_effects import read_effects
 from fabric_fenicsx.loop.report.discovered import Discovered
-from fabric_fenicsx.loop.report.effect_file import effect_file
+from fabric_fenicsx.loop.report.effect_file import _plain, effect_file
 
 FRAME, FABRIC, NOISE = 200.0, 100.0, 0.005
 BASE = {"k1_N": 0.3, "k3_N": 1.2, "c1_N_s": 5.0}
@@ -444,6 +444,15 @@ def test_derivatives_of_what_remembers(tmp_path, name):
         assert np.abs(slopes[p] - change).max() < 1e-5 * np.abs(change).max(), p
 
 
+def test_numbers_of_a_file_are_python_s():
+    numbers = _plain(
+        {"a": np.float64(1.5), "b": (np.int64(2), 3.0), "c": [np.float64(4.0)], "d": ""}
+    )
+    assert repr(numbers) == "{'a': 1.5, 'b': (2, 3.0), 'c': (4.0,), 'd': ''}"
+    kinds = [type(n) for n in (numbers["a"], *numbers["b"], *numbers["c"])]
+    assert kinds == [float, int, float, float]
+
+
 @pytest.mark.parametrize(
     ("name", "label"),
     [
@@ -481,6 +490,8 @@ def test_the_file_is_the_term(tmp_path, name, label):
     values = {p.name: p.starts[0] if p.starts else next(sizes) for p in variant.parameters}
     found = Discovered("discovered_1", effect, variant, BASE | values, pd.DataFrame(), "formula")
     (tmp_path / "discovered_1.py").write_text(effect_file(found, "made up"))
+    # What numpy 2 writes of its numbers needs numpy to be read.
+    assert "np." not in (tmp_path / "discovered_1.py").read_text()
     (own,) = run_file(tmp_path / "discovered_1.py", "effects").EFFECTS
     (form,) = own.variants
     expected, _ = experiment.predict((variant,), BASE | values)

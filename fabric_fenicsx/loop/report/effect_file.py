@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from ... import __version__
 from ...mechanics.laws.shaped import OF_ELASTIC, shape_of
 from ..inference.effects import valued
@@ -146,7 +148,7 @@ def effect_file(term: Discovered, titles: str) -> str:
         "version": __version__,
         "titles": " ".join(titles.split()).replace('"', "'"),
         "formula": term.formula,
-        "reach": shape.reach,
+        "reach": _plain(shape.reach),
         "x": shape.x,
         "y": shape.y,
         "acts_on": term.effect.acts_on,
@@ -154,14 +156,15 @@ def effect_file(term: Discovered, titles: str) -> str:
     if shape.points:
         return (HEAD + OF_EACH_RUN).format(**words)
     if term.effect.test == "cantilever":
-        values = {p.name: term.values[p.name] for p in term.variant.parameters}
-        ranges = shape.fixed["ranges"]
+        values = _plain({p.name: term.values[p.name] for p in term.variant.parameters})
+        ranges = _plain(shape.fixed["ranges"])
         form = {"term": term.effect.name, "form": term.variant.label}
         return (HEAD + OF_A_STRIP).format(values=values, ranges=ranges, **form, **words)
     numbers = {name: valued(n, term.values) for name, n in shape.fixed.items()}
+    if numbers.get("base") in OF_ELASTIC:
+        numbers |= {"k1": term.values["k1_N"], "k3": term.values["k3_N"]}
+    numbers = _plain(numbers)
     if "base" in numbers:
-        if numbers["base"] in OF_ELASTIC:
-            numbers |= {"k1": term.values["k1_N"], "k3": term.values["k3_N"]}
         lines = "\n".join(f"    {name}={value!r}," for name, value in numbers.items())
         carried: str = getattr(term.variant, "carried", "")
         words["carried"] = f'\n            carried="{carried}",' if carried else ""
@@ -181,6 +184,15 @@ def effect_file(term: Discovered, titles: str) -> str:
     if numbers.pop("from_the_top", False):
         constant = -float(shape_of(x=1.0, **numbers))
     return (HEAD + OF_THE_RIG).format(numbers=_lines(numbers), constant=constant, **words)
+
+
+def _plain(value: Any) -> Any:
+    """Numbers as Python writes them: numpy's own, of version 2, say that they are numpy's."""
+    if isinstance(value, Mapping):
+        return {name: _plain(one) for name, one in value.items()}
+    if isinstance(value, (tuple, list)):
+        return tuple(_plain(one) for one in value)
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _lines(numbers: Mapping[str, Any]) -> str:
