@@ -186,6 +186,15 @@ def test_what_changes_from_run_to_run(tmp_path, measured, term, slope):
     assert found.values[f"{term}_1"] / 4.0 == pytest.approx(slope, rel=0.05)
 
 
+def nearest(experiment, variant, variances):
+    """The best fit of one form, of those from all its starts."""
+    little = {p.name: 1e-3 for p in variant.parameters}
+    starts = [BASE | little | shape for shape in variant.grid(amplitudes=False)]
+    rows = experiment.readings.fit
+    fits = [fit(experiment, (variant,), start, rows, variances) for start in starts]
+    return min(fits, key=lambda found: found.sum_of_squares)
+
+
 def recovering_zero(t, D, speed, run):
     """A zero that the run before has moved comes back within 40 s."""
     return force_of(D, speed) + 0.1 * run * np.exp(-t / 40.0)
@@ -242,14 +251,7 @@ def test_what_two_variables_make_together_leaves_noise(tmp_path, measured, term,
     by_name = {t.name: t for t in experiment.terms}
     readings, white = experiment.readings, Variances(Noise(NOISE))
     rows, holdout = readings.fit, readings.holdout & readings.usable
-
-    def left(variant):
-        little = {p.name: 1e-3 for p in variant.parameters}
-        starts = [BASE | little | shape for shape in variant.grid(amplitudes=False)]
-        fits = [fit(experiment, (variant,), start, rows, white) for start in starts]
-        return min(fits, key=lambda found: found.sum_of_squares)
-
-    found = left(next(v for v in by_name[term].variants if v.label == label))
+    found = nearest(experiment, next(v for v in by_name[term].variants if v.label == label), white)
     assert found.rms(rows) < 1.3 * NOISE and found.rms(holdout) < 1.4 * NOISE
     assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
     acts_on, _, of = term.partition("_of_")
@@ -259,7 +261,7 @@ def test_what_two_variables_make_together_leaves_noise(tmp_path, measured, term,
             for v in by_name[f"{acts_on}_of_{variable}"].variants
             if v.label in ("5 coefficients", "gain, 2 coefficients", "2 coefficients")
         )
-        assert left(one).rms(rows) > 1.5 * NOISE, variable
+        assert nearest(experiment, one, white).rms(rows) > 1.5 * NOISE, variable
 
 
 def sum_of_earlier(run, of):
@@ -413,20 +415,14 @@ def test_what_remembers_leaves_noise(tmp_path, measured, term, label):
     rows, holdout = readings.fit, readings.holdout & readings.usable
     white = Variances(Noise(NOISE))
 
-    def left(variant):
-        little = {p.name: 1e-3 for p in variant.parameters}
-        starts = [BASE | little | shape for shape in variant.grid(amplitudes=False)]
-        fits = [fit(experiment, (variant,), start, rows, white) for start in starts]
-        return min(fits, key=lambda found: found.sum_of_squares)
-
     variant = next(v for v in by_name[term].variants if v.label == label)
-    found = left(variant)
+    found = nearest(experiment, variant, white)
     assert found.rms(rows) < 1.3 * NOISE and found.rms(holdout) < 1.3 * NOISE
     assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
     acts_on = term.partition("_")[0]
     for other in (f"{acts_on}_of_force", f"{acts_on}_of_displacement", f"{acts_on}_of_time"):
         now = next(v for v in by_name[other].variants if v.label == "5 coefficients")
-        assert left(now).rms(rows) > 1.5 * NOISE, other
+        assert nearest(experiment, now, white).rms(rows) > 1.5 * NOISE, other
 
 
 @pytest.mark.parametrize("name", ["reading_of_force_lag", "travel_of_recent_force"])
