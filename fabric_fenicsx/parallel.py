@@ -8,7 +8,7 @@ from typing import Any
 
 from .errors import InputError, SolveError
 
-__all__ = ["from_root", "launched", "neighbour", "on_one_machine", "rank", "world"]
+__all__ = ["from_root", "launched", "neighbour", "rank", "world"]
 
 NAMES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 

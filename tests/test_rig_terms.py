@@ -130,6 +130,34 @@ def write(folder, measured, runs=RUNS):
     return PictureFrame([read_measurement(folder)])
 
 
+WHITE = Variances(Noise(NOISE))
+
+
+def one_of(experiment, term, *labels):
+    """The form of a term that has one of these labels."""
+    (effect,) = (t for t in experiment.terms if t.name == term)
+    return next(v for v in effect.variants if v.label in labels)
+
+
+def nearest(experiment, variant, little=1e-3):
+    """The best fit of one form, of those from all its starts."""
+    start = BASE | {p.name: little for p in variant.parameters}
+    rows = experiment.readings.fit
+    fits = [
+        fit(experiment, (variant,), start | shape, rows, WHITE)
+        for shape in variant.grid(amplitudes=False)
+    ]
+    return min(fits, key=lambda found: found.sum_of_squares)
+
+
+def leaves_noise(experiment, found, fitted, held_out):
+    """In the readings fitted and held out so many times, where the baseline leaves more."""
+    readings = experiment.readings
+    rows, holdout = readings.fit, readings.holdout & readings.usable
+    assert fit(experiment, (), BASE, rows, WHITE).rms(rows) > 3.0 * NOISE
+    assert found.rms(rows) < fitted * NOISE and found.rms(holdout) < held_out * NOISE
+
+
 MORE = {"a": PROGRAMME, "b": PROGRAMME[::-1][1:], "c": LAST, "d": PROGRAMME[1:], "e": PROGRAMME}
 
 
@@ -170,29 +198,11 @@ def dusty_crossings(t, D, speed, run):
 def test_what_changes_from_run_to_run(tmp_path, measured, term, slope):
     """Leaves noise in the run held out between them, and is as large as it was put in."""
     experiment = write(tmp_path / "set", measured, MORE)
-    (variant,) = (
-        v
-        for t in experiment.terms
-        if t.name == term
-        for v in t.variants
-        if v.label in ("linear", "gain, linear")
-    )
-    readings, white = experiment.readings, Variances(Noise(NOISE))
-    rows, holdout = readings.fit, readings.holdout & readings.usable
+    variant = one_of(experiment, term, "linear", "gain, linear")
     start = BASE | {p.name: p.starts[0] if p.starts else 1e-3 for p in variant.parameters}
-    found = fit(experiment, (variant,), start, rows, white)
-    assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
-    assert found.rms(rows) < 1.1 * NOISE and found.rms(holdout) < 1.2 * NOISE
+    found = fit(experiment, (variant,), start, experiment.readings.fit, WHITE)
+    leaves_noise(experiment, found, 1.1, 1.2)
     assert found.values[f"{term}_1"] / 4.0 == pytest.approx(slope, rel=0.05)
-
-
-def nearest(experiment, variant, variances):
-    """The best fit of one form, of those from all its starts."""
-    little = {p.name: 1e-3 for p in variant.parameters}
-    starts = [BASE | little | shape for shape in variant.grid(amplitudes=False)]
-    rows = experiment.readings.fit
-    fits = [fit(experiment, (variant,), start, rows, variances) for start in starts]
-    return min(fits, key=lambda found: found.sum_of_squares)
 
 
 def recovering_zero(t, D, speed, run):
@@ -248,20 +258,13 @@ def worn_rack(t, D, speed, run):
 def test_what_two_variables_make_together_leaves_noise(tmp_path, measured, term, label):
     """In the run held out as well, and no single one of the same variables does."""
     experiment = write(tmp_path / "set", measured, MORE)
-    by_name = {t.name: t for t in experiment.terms}
-    readings, white = experiment.readings, Variances(Noise(NOISE))
-    rows, holdout = readings.fit, readings.holdout & readings.usable
-    found = nearest(experiment, next(v for v in by_name[term].variants if v.label == label), white)
-    assert found.rms(rows) < 1.3 * NOISE and found.rms(holdout) < 1.4 * NOISE
-    assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
+    found = nearest(experiment, one_of(experiment, term, label))
+    leaves_noise(experiment, found, 1.3, 1.4)
     acts_on, _, of = term.partition("_of_")
     for variable in {*of.split("_and_")} - {"direction", "rate", "time"}:
-        one = next(
-            v
-            for v in by_name[f"{acts_on}_of_{variable}"].variants
-            if v.label in ("5 coefficients", "gain, 2 coefficients", "2 coefficients")
-        )
-        assert nearest(experiment, one, white).rms(rows) > 1.5 * NOISE, variable
+        richest = ("5 coefficients", "gain, 2 coefficients", "2 coefficients")
+        one = one_of(experiment, f"{acts_on}_of_{variable}", *richest)
+        assert nearest(experiment, one).rms(experiment.readings.fit) > 1.5 * NOISE, variable
 
 
 def sum_of_earlier(run, of):
@@ -293,19 +296,14 @@ def abraded_spring(t, D, speed, run):
 def test_a_specimen_remembers_its_earlier_runs(tmp_path):
     """The path of all its runs leaves noise, that of each does not, and the file says which."""
     experiment = write(tmp_path / "set", abraded_spring, MORE)
+    rows = experiment.readings.fit
     effect = next(t for t in experiment.terms if t.name == "elastic_moment_of_path")
-    readings, white = experiment.readings, Variances(Noise(NOISE))
-    rows, holdout = readings.fit, readings.holdout & readings.usable
 
     def left(label):
-        variant = next(v for v in effect.variants if v.label == label)
-        some = BASE | {p.name: -0.1 for p in variant.amplitudes}
-        starts = [some | shape for shape in variant.grid(amplitudes=False)]
-        fits = [fit(experiment, (variant,), start, rows, white) for start in starts]
-        return min(fits, key=lambda found: found.sum_of_squares)
+        return nearest(experiment, one_of(experiment, effect.name, label), -0.1)
 
     found = left("path of all runs, saturation")
-    assert found.rms(rows) < 1.1 * NOISE and found.rms(holdout) < 1.2 * NOISE
+    leaves_noise(experiment, found, 1.1, 1.2)
     assert left("path, saturation").rms(rows) > 3.0 * NOISE
     (variant,) = found.variants
     width = variant.shape.reach * found.values["elastic_moment_of_path_decay"]
@@ -410,19 +408,12 @@ def test_a_guide_that_sticks_keeps_its_sign():
 def test_what_remembers_leaves_noise(tmp_path, measured, term, label):
     """In the run held out too; without it, and with the same variable now, much is left."""
     experiment = write(tmp_path / "set", measured)
-    by_name = {t.name: t for t in experiment.terms}
-    readings = experiment.readings
-    rows, holdout = readings.fit, readings.holdout & readings.usable
-    white = Variances(Noise(NOISE))
-
-    variant = next(v for v in by_name[term].variants if v.label == label)
-    found = nearest(experiment, variant, white)
-    assert found.rms(rows) < 1.3 * NOISE and found.rms(holdout) < 1.3 * NOISE
-    assert fit(experiment, (), BASE, rows, white).rms(rows) > 3.0 * NOISE
+    found = nearest(experiment, one_of(experiment, term, label))
+    leaves_noise(experiment, found, 1.3, 1.3)
     acts_on = term.partition("_")[0]
     for other in (f"{acts_on}_of_force", f"{acts_on}_of_displacement", f"{acts_on}_of_time"):
-        now = next(v for v in by_name[other].variants if v.label == "5 coefficients")
-        assert nearest(experiment, now, white).rms(rows) > 1.5 * NOISE, other
+        now = one_of(experiment, other, "5 coefficients")
+        assert nearest(experiment, now).rms(experiment.readings.fit) > 1.5 * NOISE, other
 
 
 @pytest.mark.parametrize("name", ["reading_of_force_lag", "travel_of_recent_force"])

@@ -60,49 +60,35 @@ class {class_name}(ff.CrossingLaw):
         return FOUND.history(at)
 '''
 
-OF_THE_RIG = '''
+OF_THE_RIG = """
 from ufl import max_value, min_value
 
 import fabric_fenicsx as ff
 
 AMOUNT = ff.Parameter("{name}_amount", amplitude=True, meaning="1 as it was found")
-REACH = {reach!r}
+{reaches}
 SHAPE = {{
 {numbers}
 }}
 
+{added}
 
+FOUND = {found}
+EFFECTS = [ff.Effect("{name}", "{test}", "{about}", (FOUND,), of_fabric=False)]
+"""
+
+ADDED = '''
 def added(p, x):
     """What is added, {y}, at {x} = x."""
     share = max_value(min_value(x / REACH, 1), -1)
     return p["{name}_amount"] * ({constant!r} + ff.shape_of(x=share, **SHAPE))
-
-
-FOUND = {found}
-EFFECTS = [ff.Effect("{name}", "{test}", "{about}", (FOUND,), of_fabric=False)]
 '''
 
-OF_THE_RIG_BY_TWO = '''
-from ufl import max_value, min_value
-
-import fabric_fenicsx as ff
-
-AMOUNT = ff.Parameter("{name}_amount", amplitude=True, meaning="1 as it was found")
-REACH, ALSO_REACH = {reach!r}, {also_reach!r}
-SHAPE = {{
-{numbers}
-}}
-
-
+ADDED_BY_TWO = '''
 def added(p, v, w):
     """What is added, {y}, at {x} = v and {also_x} = w."""
-    shares = (max_value(min_value(n / r, 1), -1) for n, r in ((v, REACH), (w, ALSO_REACH)))
-    x, other = shares
+    x, other = (max_value(min_value(n / r, 1), -1) for n, r in ((v, REACH), (w, ALSO_REACH)))
     return p["{name}_amount"] * ff.product_of(x=x, w=other, **SHAPE)
-
-
-FOUND = {found}
-EFFECTS = [ff.Effect("{name}", "{test}", "{about}", (FOUND,), of_fabric=False)]
 '''
 
 FOUND_OF_THE_RIG = 'ff.of_the_rig("as found", (AMOUNT,), "{acts_on}", "{variable}", added{options})'
@@ -178,12 +164,16 @@ def effect_file(term: Discovered, titles: str) -> str:
         words["found"] = FOUND_OF_THE_RIG.format(**rig)
     numbers["kind"] = numbers.pop("shape")
     if "powers" in numbers:
-        words |= {"also_x": shape.also, "also_reach": numbers.pop("also_reach")}
-        return (HEAD + OF_THE_RIG_BY_TWO).format(numbers=_lines(numbers), **words)
-    constant = numbers.pop("constant", 0.0)
-    if numbers.pop("from_the_top", False):
-        constant = -float(shape_of(x=1.0, **numbers))
-    return (HEAD + OF_THE_RIG).format(numbers=_lines(numbers), constant=constant, **words)
+        also_reach = numbers.pop("also_reach")
+        words["reaches"] = f"REACH, ALSO_REACH = {words['reach']!r}, {also_reach!r}"
+        words["added"] = ADDED_BY_TWO.format(also_x=shape.also, **words)
+    else:
+        constant = numbers.pop("constant", 0.0)
+        if numbers.pop("from_the_top", False):
+            constant = -float(shape_of(x=1.0, **numbers))
+        words["reaches"] = f"REACH = {words['reach']!r}"
+        words["added"] = ADDED.format(constant=constant, **words)
+    return (HEAD + OF_THE_RIG).format(numbers=_lines(numbers), **words)
 
 
 def _plain(value: Any) -> Any:

@@ -20,7 +20,7 @@ from typing import Any
 from ...inference.effects import Effect, Shape, Values
 from ..records import FEWEST_BEFORE
 from .shapes import SPLINES, Drawn, Of, over_runs, splines
-from .term import X, Y, of_strip, strip_effect, strip_form, times, turned
+from .term import X, Y, of_strip, on_the_strip, strip_effect, strip_form, times, turned
 from .variant import StripVariant
 
 __all__ = ["products"]
@@ -52,10 +52,7 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
     ]
     about = "scale of heights that changes from run to run"
     yield strip_effect(name, about, "reading", ("height", "run"), forms)
-    for acts_on, unit, what in (
-        ("rest_curvature", ranges["curvature"], "curvature of the unloaded strip"),
-        ("load", 1.0, "weight"),
-    ):
+    for acts_on, unit, what in on_the_strip(ranges):
         name = f"{acts_on}_of_arc_length_and_run"
         forms = [
             strip_form(

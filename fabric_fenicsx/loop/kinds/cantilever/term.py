@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from typing import Any
 
 from ufl import min_value
 
 from ....inputs.parameters import Parameter
 from ...inference.effects import Effect, Shape, Values
-from .shapes import Of
+from .shapes import Drawn, Of
 from .variant import StripVariant
 
-__all__ = ["X", "Y", "of_strip", "strip_effect", "strip_form", "times", "turned"]
+__all__ = [
+    "X",
+    "Y",
+    "form_of_strip",
+    "of_strip",
+    "on_the_strip",
+    "strip_effect",
+    "strip_form",
+    "times",
+    "turned",
+]
 
 X = {
     "clamp": "arc_length_mm",
@@ -60,6 +71,24 @@ def strip_form(
     if acts_on == "load":
         return StripVariant(label, parameters, shape=shape, load=of)
     return StripVariant(label, parameters, shape=shape, added_curvature=of)
+
+
+def on_the_strip(ranges: Mapping[str, float]) -> tuple[tuple[str, float, str], ...]:
+    """What a term adds to beside a moment, its unit, and in words."""
+    return (
+        ("rest_curvature", ranges["curvature"], "curvature of the unloaded strip"),
+        ("load", 1.0, "weight"),
+    )
+
+
+def form_of_strip(
+    drawn: Drawn, acts_on: str, unit: float, variable: str, most: float
+) -> StripVariant:
+    """A form of what is the same all along a strip; see of_strip."""
+    label, parameters, g = drawn
+    shape = Shape(X[variable], Y[acts_on], most, partial(times, unit, g))
+    at = partial(of_strip, unit, g, variable, most)
+    return strip_form(label, parameters, shape, acts_on, at)
 
 
 def times(unit: float, g: Of, p: Values, x: Any) -> Any:

@@ -42,7 +42,17 @@ from .shapes import (
     splines,
     wave,
 )
-from .term import X, Y, of_strip, strip_effect, strip_form, times, turned
+from .term import (
+    X,
+    Y,
+    form_of_strip,
+    of_strip,
+    on_the_strip,
+    strip_effect,
+    strip_form,
+    times,
+    turned,
+)
 from .variant import StripVariant
 
 __all__ = ["strip_term", "terms"]
@@ -171,10 +181,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
     about, of = "any odd law of the curvature", ("nonlinear_bending",)
     yield strip_effect(name, about, "bending_moment", ("curvature",), forms, of)
 
-    for acts_on, unit, about in (
-        ("rest_curvature", bend, "curvature of the unloaded strip"),
-        ("load", 1.0, "weight"),
-    ):
+    for acts_on, unit, about in on_the_strip(ranges):
         # A weight that is even is no other than B, and a curvature has nothing to stand for it.
         constant = acts_on == "rest_curvature"
         name = f"{acts_on}_of_arc_length"
@@ -199,14 +206,8 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         )
         name = f"{acts_on}_of_length"
         forms = [
-            strip_form(
-                label,
-                parameters,
-                Shape("length_mm", Y[acts_on], longest, partial(times, unit, g)),
-                acts_on,
-                partial(of_strip, unit, g, "length", longest),
-            )
-            for label, parameters, g in splines(name, SPLINES[:1], constant=constant)
+            form_of_strip(drawn, acts_on, unit, "length", longest)
+            for drawn in splines(name, SPLINES[:1], constant=constant)
         ]
         yield strip_effect(name, f"{about} that goes by the overhang", acts_on, ("length",), forms)
 
@@ -270,9 +271,8 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         unit = None if to == "scale" else depth
         camera = partial(_higher, of, by, most, unit)
         # In a table they stand beside each other.
-        y = "share_of_height" if unit is None else "added_height_mm" if by == "z" else "height_mm"
-        names = {"x": "distance_mm", "z": "height_mm", "length": "length_mm"}
-        shape = Shape(names[by], y, most, partial(times, unit or 1.0, of))
+        y = "share_of_height" if unit is None else "added_height_mm" if by == "z" else X["z"]
+        shape = Shape(X[by], y, most, partial(times, unit or 1.0, of))
         return StripVariant(f"{to}, {label}", parameters, shape=shape, camera=camera)
 
     name = "reading_of_height"
@@ -284,7 +284,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
 
     name = "reading_of_distance"
     turn = Parameter(f"{name}_turn_rad", amplitude=True)
-    shape = Shape("distance_mm", "height_mm", width, lambda p, x: p[turn.name] * width * x)
+    shape = Shape(X["x"], X["z"], width, lambda p, x: p[turn.name] * width * x)
     forms = [
         StripVariant("turned", (turn,), shape=shape, camera=lambda p, at: turned(p[turn.name], at))
     ]
@@ -315,7 +315,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
 
 def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
     """What handling does to a strip from one run to the next."""
-    last, bend = ranges.get("runs", 0.0), ranges["curvature"]
+    last = ranges.get("runs", 0.0)
     if last < FEWEST_BEFORE:
         return
     name = "bending_moment_of_run"
@@ -323,27 +323,18 @@ def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
         StripVariant(
             label,
             parameters,
-            shape=Shape("runs_before", "log_flexibility", last, g),
+            shape=Shape(X["run"], "log_flexibility", last, g),
             added_moment=partial(_softened, g, last),
         )
         for label, parameters, g in over_runs(name)
     ]
     about = "bending stiffness that changes from run to run of a specimen"
     yield strip_effect(name, about, "bending_moment", ("run",), forms)
-    for acts_on, unit, about in (
-        ("rest_curvature", bend, "curvature of the unloaded strip"),
-        ("load", 1.0, "weight"),
-    ):
+    for acts_on, unit, about in on_the_strip(ranges):
         name = f"{acts_on}_of_run"
         forms = [
-            strip_form(
-                label,
-                parameters,
-                Shape("runs_before", Y[acts_on], last, partial(times, unit, g)),
-                acts_on,
-                partial(of_strip, unit, g, "run", last),
-            )
-            for label, parameters, g in over_runs(name, constant=acts_on == "rest_curvature")
+            form_of_strip(drawn, acts_on, unit, "run", last)
+            for drawn in over_runs(name, constant=acts_on == "rest_curvature")
         ]
         words = f"{about} that changes from run to run of a specimen"
         yield strip_effect(name, words, acts_on, ("run",), forms)

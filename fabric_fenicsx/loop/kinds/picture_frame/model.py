@@ -84,7 +84,8 @@ class PictureFrame(CrossheadTest):
         if ranges["run_of_specimen"]:
             whole = self._past_of_specimens["path"] + self._paths
             ranges["path_of_specimen"] = float(whole[fitted].max())
-        return [*terms(ranges, self._ends()), *products(ranges), *rig_products(ranges_of(ranges))]
+        largest = ranges_of(ranges)
+        return [*terms(largest, self._ends()), *products(largest), *rig_products(largest)]
 
     @property
     def one_curve(self) -> OneCurve | None:

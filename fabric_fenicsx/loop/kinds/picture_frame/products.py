@@ -13,10 +13,9 @@ from functools import partial
 from typing import Any
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shaped import product_of
-from ...inference.effects import Effect, Shape, Values, valued
-from .shapes import FORGETFUL, MOST, SQUARES, X, Y, fitted, remembered_since, shapes
-from .terms import as_reported, of_a_law, ranges_of, remembering
+from ...inference.effects import Effect, Shape
+from .shapes import FORGETFUL, SQUARES, X, Y, fitted, of_powers, product, remembered_since, shapes
+from .terms import as_reported, of_a_law, remembering
 from .variant import FrameVariant
 
 __all__ = ["products"]
@@ -60,13 +59,12 @@ KINDS = (
 rate, a dashpot and a friction that depend on the angle, likewise."""
 
 
-def products(ranges: Mapping[str, float]) -> list[Effect]:
+def products(largest: Mapping[str, float]) -> list[Effect]:
     """The terms of a picture frame over two variables.
 
     Args:
-        ranges: see terms.
+        largest: sizes of the variables; see terms.ranges_of.
     """
-    largest = ranges_of(ranges)
     found = []
     for kind in KINDS:
         for by, variables in as_reported(kind.by).items():
@@ -120,14 +118,9 @@ def _shapes(
     few = 2 if variable in FORGETFUL else kind.wealth
     wealth = 1 if variable in ("unloading", *SQUARES) else few
     for label, one, numbers in shapes(name, wealth):
-        if len(powers) * len(one) > MOST:
-            continue
-        coefficients = tuple(
-            Parameter(f"{name}_{p}_{k + 1}", amplitude=True)
-            for p in powers
-            for k in range(len(one))
-        )
-        yield label, numbers | {"coefficients": coefficients}
+        coefficients = of_powers(name, powers, one)
+        if coefficients is not None:
+            yield label, numbers | {"coefficients": coefficients}
 
 
 def _form(label: str, own: dict[str, Any], carried: str, like: FrameVariant | None) -> FrameVariant:
@@ -135,17 +128,10 @@ def _form(label: str, own: dict[str, Any], carried: str, like: FrameVariant | No
         X[own["variable"]],
         Y.get(own["base"], "moment_N"),
         own["reach"],
-        partial(_factor, own),
+        partial(product, own),
         own,
         also=X[own["also"]],
         also_reach=own["also_reach"],
     )
     laws = partial(of_a_law, own)
     return FrameVariant(label, fitted(own), shape=shape, laws=laws, carried=carried, like=like)
-
-
-def _factor(numbers: Mapping[str, Any], values: Values, x: Any, w: Any) -> Any:
-    """A law's factor at shares x and w of what was reached."""
-    own = {key: valued(n, values) for key, n in numbers.items()}
-    more = {key: own[key] for key in ("constants", "place", "width") if key in own}
-    return product_of(own["shape"], own["coefficients"], x, w, own["powers"], **more)

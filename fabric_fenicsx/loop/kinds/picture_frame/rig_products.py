@@ -15,10 +15,9 @@ from typing import Any
 from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shaped import product_of
-from ...inference.effects import Effect, Shape, Values, valued
+from ...inference.effects import Effect, Shape, Values
 from .rig_terms import of_the_rig, rig_term
-from .shapes import MOST, X, Y, fitted, over_runs, shapes
+from .shapes import X, Y, fitted, of_powers, over_runs, product, shapes
 from .variant import FrameVariant
 
 __all__ = ["rig_products"]
@@ -75,12 +74,11 @@ def _forms(
 ) -> Iterator[FrameVariant]:
     drawn = over_runs(name) if v == "run" else shapes(name, 3)
     for label, one, numbers in drawn:
-        if len(powers) * len(one) > MOST:
+        coefficients = of_powers(name, powers, one)
+        if coefficients is None:
             continue
-        each = [[Parameter(f"{c.name}_{p}", amplitude=True) for c in one] for p in powers]
-        constants = tuple(Parameter(f"{name}_0_{p}", amplitude=True) for p in powers)
-        own = {**numbers, "powers": powers, "constants": constants}
-        own["coefficients"] = tuple(c for some in each for c in some)
+        constants = tuple(Parameter(f"{name}_{p}_0", amplitude=True) for p in powers)
+        own = {**numbers, "powers": powers, "coefficients": coefficients, "constants": constants}
         reach, also_reach = largest[v], largest[w]
         yield of_the_rig(
             f"{label}, powers {', '.join(map(str, powers))}",
@@ -93,7 +91,7 @@ def _forms(
                 X[v],
                 Y[acts_on],
                 reach,
-                partial(_product, own),
+                partial(product, own),
                 own | {"variable": v, "also": w, "also_reach": also_reach},
                 also=X[w],
                 also_reach=also_reach,
@@ -106,10 +104,4 @@ def _at(
 ) -> Any:
     """What is added at two variables, beyond their reaches as there."""
     x, other = (max_value(min_value(n / r, 1), -1) for n, r in ((v, reach), (w, also_reach)))
-    return _product(numbers, p, x, other)
-
-
-def _product(numbers: Mapping[str, Any], values: Values, x: Any, w: Any) -> Any:
-    """The same at shares x and w of what was reached."""
-    own = {key: valued(n, values) for key, n in numbers.items()}
-    return product_of(own.pop("shape"), own.pop("coefficients"), x, w, own.pop("powers"), **own)
+    return product(numbers, p, x, other)

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shaped import GRADED, shape_of
+from ....mechanics.laws.shaped import GRADED, product_of, shape_of
 from ...inference.effects import Values, valued
 
 __all__ = [
     "FINE",
     "FORGETFUL",
-    "MOST",
     "SQUARES",
     "Ends",
     "X",
@@ -23,7 +22,9 @@ __all__ = [
     "factor",
     "fitted",
     "memory_of",
+    "of_powers",
     "over_runs",
+    "product",
     "remembered_since",
     "shapes",
     "waves",
@@ -115,6 +116,24 @@ def factor(numbers: Mapping[str, Any], values: Values, x: Any) -> Any:
     at = {key: own[key] for key in ("place", "width", "ends") if key in own}
     top = shape_of(*shape, 1.0, **at) if own.get("from_the_top") else 0.0
     return own.get("constant", 0.0) - top + shape_of(*shape, x, **at)
+
+
+def of_powers(
+    name: str, powers: Sequence[int], one: Sequence[Parameter]
+) -> tuple[Parameter, ...] | None:
+    """Coefficients of a product, so many of each power; None if they are too many."""
+    if len(powers) * len(one) > MOST:
+        return None
+    return tuple(
+        Parameter(f"{name}_{p}_{k + 1}", amplitude=True) for p in powers for k in range(len(one))
+    )
+
+
+def product(numbers: Mapping[str, Any], values: Values, x: Any, w: Any) -> Any:
+    """What ``factor`` is of one variable, of two: at shares x and w of their reaches."""
+    own = {key: valued(n, values) for key, n in numbers.items()}
+    more = {key: own[key] for key in ("constants", "place", "width") if key in own}
+    return product_of(own["shape"], own["coefficients"], x, w, own["powers"], **more)
 
 
 def memory_of(name: str, largest: Mapping[str, float], *shares: float) -> Parameter:
