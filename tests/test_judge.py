@@ -83,6 +83,33 @@ def test_slow_noise_is_doubted_sooner_beside_a_name(correlation, named, term, al
         slow = replace(model, estimate=replace(model.estimate, variances=variances))
         assert judge.doubtful_noise(slow) == bool(doubted)
         assert judge.doubtful_noise(replace(slow, effects=())) == bool(alone)
+        # Whatever is in it.
+        assert judge.slow_noise(slow) == bool(alone)
+        judge.given = SIGMA
+        assert not judge.slow_noise(slow)
+
+
+@pytest.mark.parametrize(("truth", "found"), [("two", {"wave", "step"}), ("both", {"both"})])
+def test_what_two_terms_explain_is_not_a_name_with_slow_noise(truth, found):
+    """An effect that is nearly the two together leaves a misfit that looks like slow noise."""
+    t = np.tile(np.linspace(0.0, 1.0, 120), 3)
+    columns = {"a": np.ones_like(t), "b": t}
+    columns["wave"] = np.sin(2.0 * np.pi * t)
+    columns["step"] = 1.0 / (1.0 + np.exp(-(t - 0.5) / 0.05))
+    mixed = columns["wave"] + 2.0 * columns["step"] + 0.05 * np.sin(3.0 * np.pi * t)
+    columns["both"] = mixed
+    clean = columns["wave"] + 2.0 * columns["step"] if truth == "two" else mixed
+    observed = 1.0 + 2.0 * t + clean + 0.01 * np.random.default_rng(4).normal(size=len(t))
+    test = Linear(readings(observed, run=np.repeat(np.arange(3), 120)), columns, ("a", "b"))
+
+    def effect(name, acts_on):
+        own = (Parameter(name, amplitude=True),)
+        return Effect(name, "linear", "", (Variant("only", own),), acts_on=acts_on)
+
+    test.effects = [effect("both", "")]
+    test.terms = [effect("wave", "moment"), effect("step", "reading")]
+    test.terms_are_rivals = test.each_its_own_way = False
+    assert {e.name for e in diagnose_test(test).effects} == found
 
 
 def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None):

@@ -222,12 +222,18 @@ class Judge:
     def doubtful_noise(self, model: Model) -> bool:
         """Whether noise is more than was stated or, where none was, as slow as a misfit."""
         if self.given is None:
-            slow = CRITERIA.slow_noise
-            if model.effects:
-                named = all(effect.listed for effect in model.effects)
-                slow = CRITERIA.slow_named if named else CRITERIA.slow_beside
+            if not model.effects:
+                return self.slow_noise(model)
+            named = all(effect.listed for effect in model.effects)
+            slow = CRITERIA.slow_named if named else CRITERIA.slow_beside
             return model.estimate.variances.noise.correlation > slow
         return self.misfit(model).reading > CRITERIA.scatter * self.given
+
+    def slow_noise(self, model: Model) -> bool:
+        """Whether noise that was not stated is so slow that it looks like a misfit."""
+        return self.given is None and (
+            model.estimate.variances.noise.correlation > CRITERIA.slow_noise
+        )
 
     def fits(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise, in size, on what it was fitted to.

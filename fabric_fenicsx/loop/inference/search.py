@@ -88,6 +88,12 @@ def diagnose_test(
         # What is beaten so is not it, whether or not what beats it is all that there is.
         further.most = None
         return _beside(further.run(), found)
+    if own and search.judge.slow_noise(final):
+        # As slow as a misfit: what several terms explain instead is not said to be noise.
+        further.most = None
+        several = further.run()
+        if further.accounted and several.criterion_after < final.criterion - CRITERIA.decisive:
+            return _beside(several, found)
     if search.effects_needed == 1 and (rivals or alike):
         _name_terms(search, found, final, single, other)
     return found

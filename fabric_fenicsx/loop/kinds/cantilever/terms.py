@@ -305,9 +305,9 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     yield strip_effect(name, about, "reading", ("height", "distance"), forms)
 
     name = "reading_of_length"
-    forms = [
-        form(*shape, "length", to) for to in ("scale", "height") for shape in splines(name, SPLINES)
-    ]
+    forms = [form(*shape, "length", "scale") for shape in splines(name, SPLINES)]
+    # Nobody knows where a camera that moves with the overhang has its zero.
+    forms += [form(*shape, "length", "height") for shape in splines(name, SPLINES, constant=True)]
     yield strip_effect(
         name, "heights, or their scale, by the overhang", "reading", ("length",), forms
     )

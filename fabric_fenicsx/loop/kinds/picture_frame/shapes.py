@@ -34,7 +34,14 @@ __all__ = [
 #: Numbers of coefficients of a spline; the last one of what a place may have to itself.
 SPLINES = (1, 2, 3, 5, 9)
 #: What has that one.
-FINE = (("odd", "angle"), ("even", "angle"), ("reading", "displacement"), ("reading", "force"))
+FINE = (
+    ("odd", "angle"),
+    ("even", "angle"),
+    ("dissipative", "angle"),
+    ("smooth", "angle"),
+    ("reading", "displacement"),
+    ("reading", "force"),
+)
 #: Where a step may begin to be looked for, as a share of the range, and how wide it is.
 PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
 #: Likewise of a bump.
