@@ -122,7 +122,7 @@ def test_what_strips_say_is_evaluated_once_and_the_same(strip, monkeypatch):
     assert strip._kinematics(strip._points, {}) is known
     ends = [of["gamma"].value[-1, -1] for of in (strip._kinematics(of_drawn, values), known)]
     assert ends[0] < ends[1]
-    anew = Travels(strip._points["D"].value, strip._back)
+    anew = Travels(strip._points["D"].value, strip._phase)
     monkeypatch.setattr(strip, "_recorded_travels", anew)
     strip._of_recorded.cache_clear()
     found, other_slopes = strip.predict((), values)
@@ -157,6 +157,37 @@ def test_what_slipped_is_not_undone_on_the_way_back():
     assert np.sqrt(np.mean(off**2)) < 0.005 * exact["force_N"].max()
     angle = test.middle_angle((slip,), values)[back]
     assert angle == pytest.approx(exact["shear_angle_deg"][back], abs=0.1)
+
+
+def test_what_slipped_holds_while_the_crosshead_stands():
+    """A fast strip comes to rest: dashpots let go, and tows that slipped no longer do."""
+    law = {"k1_N_mm": 0.02, "k3_N_mm": 0.2, "dashpot_N_s_mm": 0.05, "translation_N_mm": 10.0}
+    per_force = 2.5
+    law["slip_limit_N"] = 1.0 / per_force
+    times, places = np.array([0.0, 3.5, 10.5]), np.array([0.0, TRAVEL, TRAVEL])
+    exact = by_the_rig(LENGTH, times, places, law=law, steps=180, readings=61)
+    columns = {name: exact[name] for name in ("time_s", "displacement_mm", "force_N")}
+    run = Run("run.csv", False, "", columns, own={"length_mm": LENGTH, "width_mm": WIDTH})
+    test = BiasExtension([measured(run)])
+    (slip,) = (v for e in test.effects if e.name == "crossover_slip" for v in e.variants)
+    values = VALUES | {"c1_N_s": 0.05, "slip_1_N": per_force}
+    test.settle((slip,), values)
+    force, angle = test.predict((slip,), values)[0], test.middle_angle((slip,), values)
+    fell = exact["force_N"].max() - exact["force_N"][-1]
+    assert fell > 0.1 * exact["force_N"].max()
+    # It takes a moment to get there.
+    rested = exact["time_s"] > 3.5 + 2.0
+    assert force[rested] == pytest.approx(exact["force_N"][rested], abs=0.02 * fell)
+    assert angle[rested] == pytest.approx(exact["shear_angle_deg"][rested], abs=0.05)
+
+
+def test_a_hold_does_not_make_a_crosshead_slow():
+    """Strips are solved at the speed it moves with, wherever in a hold it is read furthest."""
+    D = np.concatenate([np.linspace(0.0, TRAVEL, 15), np.full(30, TRAVEL)])
+    D[-3] += 1e-9
+    columns = {"time_s": 0.25 * np.arange(45), "displacement_mm": D, "force_N": np.zeros(45)}
+    run = Run("run.csv", False, "", columns, own={"length_mm": LENGTH, "width_mm": WIDTH})
+    assert BiasExtension([measured(run)])._speed == pytest.approx(4.0, rel=0.01)
 
 
 def test_what_is_pulled_once_is_not_solved_back(strip):

@@ -104,6 +104,25 @@ def test_a_way_back_is_solved_as_such():
     assert (force[:28] - force[:28:-1])[10:20].min() > 0.05 * force.max()
 
 
+def test_a_strip_that_was_stopped_goes_on_as_if_it_had_not_been():
+    """And is another one while it stands still, with more of a lever, where some of it slips."""
+    slow = replace(SOFT, dashpot=0.02)
+    wanted = case(SLIPPING, 2.0 * WIDTH, 14.0, WIDTH, steps=20)
+    path, rest = (solved_strip(wanted, slow, stops) for stops in (False, True))
+    held = rest.rest
+    assert path.rest is None and held is not None
+    for name in ("travel", "force", "gamma", "middle"):
+        one, other = getattr(path, name), getattr(rest, name)
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-5 * np.abs(other).max())
+    assert (held.force[1:] < path.force[1:]).all()
+    # The lever is of a strip in which nothing slips: the work of its moments is more force.
+    along = PchipInterpolator(path.travel, path.gamma).derivative()(path.travel[-2])
+    sheared = path.gamma[-2] > 0.5 * path.gamma[-2].max()
+    assert held.lever[-2][sheared].mean() > 1.02 * along[sheared].mean()
+    # Without a limit that it comes to there is nothing to be had.
+    assert solved_strip(case(), slow, True).rest is None
+
+
 def test_a_way_back_has_a_curve_of_its_own():
     """Half the moments on the same way make half of their force."""
     both = replace(STIFF, back=Curve(tuple(m / 2.0 for m in STIFF.moments)))
@@ -115,10 +134,10 @@ def test_a_way_back_has_a_curve_of_its_own():
 
 
 def test_a_way_out_is_had_without_the_way_back(monkeypatch):
-    def stops(model, case, corners, seen):
+    def stops(model, case, *more):
         if case.unload:
             raise SolveError("on the way back")
-        return original(model, case, corners, seen)
+        return original(model, case, *more)
 
     whole, original = solved_strip(case(), SOFT), strip.pulled
     monkeypatch.setattr(strip, "pulled", stops)

@@ -12,17 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ...expressions.marching import Varying
-from .solved import GROUPS, Solved
+from .solved import GROUPS, Name, Phases, Solved
 
-__all__ = ["Part", "Travels", "gamma_of", "number", "of_ways"]
+__all__ = ["Part", "Travels", "number", "of_groups", "of_ways"]
 
 Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: How much of what solved strips say is kept, each of some quantity of all runs, and numbers of it.
 KEPT, MOST_NUMBERS = 60, 12_000_000
-
-Name = Literal["gamma", "rest", "middle"]
 
 
 def number(value: float, slopes: Mapping[str, Any] = MappingProxyType({})) -> Varying:
@@ -49,19 +46,21 @@ class Travels:
 
     Args:
         D: travels [mm], (n_points, n_runs).
-        back: whether on the way back, (n_points, n_runs).
+        phase: what the crossheads do there, (n_points, n_runs).
         kept: whether what strips say is kept: of travels that are asked for again and again.
     """
 
-    def __init__(self, D: Array, back: Flags, *, kept: bool = False) -> None:
-        self._D, self._back = D, back
+    def __init__(self, D: Array, phase: Phases, *, kept: bool = False) -> None:
+        self._D, self._phase = D, phase
         self._of = self._evaluated
         if kept:
             most = MOST_NUMBERS // max(D.size * GROUPS, 1)
             self._of = lru_cache(maxsize=min(KEPT, most))(self._evaluated)
 
     def of(self, solved: Solved, name: Name, order: int = 0) -> Array:
-        """Angles of all groups, rests or middles, or derivatives in D; not to be written to.
+        """Angles and levers of all groups, rests or middles, or derivatives in D.
+
+        Not to be written to.
 
         Returns:
             (n_points, n_groups) of all runs together, or (n_points, n_runs).
@@ -70,17 +69,30 @@ class Travels:
 
     def _evaluated(self, solved: Solved, name: Name, order: int) -> Array:
         ways = enumerate(solved.ways)
-        own = [way.at(name, self._D[:, r], self._back[:, r], order) for r, way in ways]
+        own = [way.at(name, self._D[:, r], self._phase[:, r], order) for r, way in ways]
         found = np.column_stack(own)
         found.flags.writeable = False
         return found
 
 
-def gamma_of(parts: Sequence[Part], travels: Travels, order: int) -> Varying:
-    """Angles of all groups, or derivatives in D, (n_points, n_groups)."""
+def of_groups(
+    parts: Sequence[Part],
+    travels: Travels,
+    name: Literal["gamma", "lever"],
+    slopes: Mapping[str, Array] = MappingProxyType({}),
+) -> Varying:
+    """Angles of all groups, or their levers dγ/dD, (n_points, n_groups).
+
+    Args:
+        parts: of the model.
+        travels: of its runs.
+        name: which of the two.
+        slopes: derivatives of the travels by parameter, (n_points, n_groups) each.
+    """
     total = number(0.0)
     for part in parts:
-        total += part.weight * Varying(travels.of(part.solved, "gamma", order))
+        change = {p: travels.of(part.solved, name, 1) * slope for p, slope in slopes.items()}
+        total += part.weight * Varying(travels.of(part.solved, name), change)
     return total
 
 

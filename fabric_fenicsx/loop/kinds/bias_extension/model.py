@@ -37,10 +37,10 @@ from ..picture_frame.variant import FrameVariant
 from ..records import shifted
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
-from .mixture import Part, Travels, gamma_of, number, of_ways
+from .mixture import Part, Travels, number, of_groups, of_ways
 from .quantities import first_curve, read_together, strip_of
 from .settled import Correction, Quantity, correction
-from .solved import GROUPS, Solved, SolvedStrips, Wanted, reached
+from .solved import GROUPS, Phase, Phases, Solved, SolvedStrips, Wanted, reached
 from .strip import FINE_STEPS, KNOTS, Curve, strip_case
 from .terms import strip_terms
 
@@ -49,7 +49,8 @@ __all__ = ["BiasExtension", "solved_by"]
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-#: Speeds of the crosshead that are told apart differ by this factor: tows are hardly viscous.
+#: Speeds of the crosshead that are told apart differ by this factor; of others strips are solved
+#: at the mean. Half as much again of a dashpot is not foretold where tows slip.
 PACE = 1.5
 #: Points of the way on which a law with memory is followed to its curve.
 ALONG = 60
@@ -158,9 +159,9 @@ class BiasExtension(CrossheadTest):
             SolveError: the strips stopped before their end.
         """
         solved = self._strips.solved({}, curve)
-        D, back = self._points["D"].value, self._back
+        D, phase = self._points["D"].value, self._phase
         force = np.stack(
-            [way.force(D[:, r], back[:, r], curve) for r, way in enumerate(solved.ways)], axis=1
+            [way.force(D[:, r], phase[:, r], curve) for r, way in enumerate(solved.ways)], axis=1
         )
         rows = self.readings.usable & self.readings.first
         expected, travel = (self._recorded.at_readings(values)[rows] for values in (force, D))
@@ -175,20 +176,22 @@ class BiasExtension(CrossheadTest):
     def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
         D, time = self._points["D"].value, self._points["time"].value
         self._runs = list(runs)
-        out = np.argmax(D, axis=0)
-        columns = np.arange(len(runs))
-        speed = D.max(axis=0) / np.maximum(time[out, columns] - time[0], 1e-9)
+        speed = _speed_out(D, time, self._points["D_rate"].value)
         # Strips alike are solved once, as far as the furthest of them goes.
-        paces = np.round(np.log(speed) / np.log(PACE))[self._parent]
+        own_pace = np.log(speed)[self._parent]
+        paces = np.round(own_pace / np.log(PACE))
         kinds = [(m.fabric, m.rig, run.own, n) for (m, run), n in zip(runs, paces, strict=True)]
         same = [[other == own for other in kinds] for own in kinds]
         self._furthest = np.array([D.max(axis=0)[own].max() for own in same])
-        self._speed = PACE**paces
+        self._speed = np.exp([own_pace[own].mean() for own in same])
         self._back = _backward(D, self._points["D_rate"].value)
         gone = np.max(np.where(self._back, self._furthest - D, 0.0), axis=0)
         back = np.array([gone[own].max() for own in same]) > GONE_BACK * self._furthest
         self._back &= back
-        self._recorded_travels = Travels(D, self._back, kept=True)
+        self._phase = _phases(D, self._points["D_rate"].value, self._back)
+        stopped = (self._phase == Phase.STOPPED).any(axis=0)
+        stops = np.array([stopped[own].any() for own in same])
+        self._recorded_travels = Travels(D, self._phase, kept=True)
 
         def going(solved: Solved) -> dict[str, Varying]:
             parts = [Part(solved, number(1.0))]
@@ -206,7 +209,8 @@ class BiasExtension(CrossheadTest):
         self._typical_rate = float(np.nanmedian(rates))
         like = self._like
         paths = {} if like is None else like._strips.paths
-        self._strips: SolvedStrips = SolvedStrips(runs, self._furthest, self._speed, back, paths)
+        strips = self._furthest, self._speed, back, stops
+        self._strips: SolvedStrips = SolvedStrips(runs, *strips, paths)
         suggested = self._first
         if suggested is None:
             suggested = first_curve(self._of_forces()) if like is None else like.curve
@@ -215,7 +219,7 @@ class BiasExtension(CrossheadTest):
             float(way.gamma(D).max()) for way, D in zip(first.ways, self._furthest, strict=True)
         )
         self._first_forces = [
-            float(way.force(np.array([D]), np.array([False]), first.curve)[0])
+            float(way.force(np.array([D]), np.array([Phase.OUT], np.int8), first.curve)[0])
             for way, D in zip(first.ways, self._furthest, strict=True)
         ]
         self._mixture = [Part(first, number(1.0))]
@@ -422,7 +426,7 @@ class BiasExtension(CrossheadTest):
 
     def _travels(self, D: Varying) -> Travels:
         """Travels of a model; most have those of the crossheads."""
-        return self._recorded_travels if D is self._points["D"] else Travels(D.value, self._back)
+        return self._recorded_travels if D is self._points["D"] else Travels(D.value, self._phase)
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]
@@ -437,33 +441,25 @@ class BiasExtension(CrossheadTest):
         """How the crossings of solved strips go at some travels; see _kinematics."""
         area = np.concatenate([way.area for way in parts[0].solved.ways])
         travels = self._travels(D)
-        gamma, first, second = (gamma_of(parts, travels, order) for order in range(3))
 
         def each(values: Array) -> Array:
             """Of every run, at each of its groups."""
             return np.repeat(np.broadcast_to(values, D.value.shape), GROUPS, axis=1)
 
-        rate = Varying(
-            first.value * each(speed.value),
-            {p: slope * each(speed.value) for p, slope in first.slopes.items()},
-        )
-        for p, slope in D.slopes.items():
-            along = each(slope)
-            gamma.slopes[p] = first.value * along
-            rate.slopes[p] = second.value * along * each(speed.value)
-            first.slopes[p] = second.value * along
-        for p, slope in speed.slopes.items():
-            rate.slopes[p] = rate.slopes.get(p, 0.0) + first.value * each(slope)
+        along = {p: each(slope) for p, slope in D.slopes.items()}
+        gamma = of_groups(parts, travels, "gamma", along)
+        lever = of_groups(parts, travels, "lever", along)
+        pace = Varying(each(speed.value), {p: each(slope) for p, slope in speed.slopes.items()})
         return {
             "gamma": gamma,
             "gamma_n": Varying(
                 shifted(gamma.value), {p: shifted(s) for p, s in gamma.slopes.items()}
             ),
-            "rate": rate,
+            "rate": lever * pace,
             "per_time": Varying(each(self._points["per_time"].value)),
-            "rate_per_speed": first,
+            "rate_per_speed": lever,
             "factor": Varying(
-                area * first.value, {p: area * slope for p, slope in first.slopes.items()}
+                area * lever.value, {p: area * slope for p, slope in lever.slopes.items()}
             ),
         }
 
@@ -496,7 +492,7 @@ class BiasExtension(CrossheadTest):
     def _correction(self, variants: Sequence[Variant], travel: Any, quantity: Quantity) -> Varying:
         """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
         off = self._corrections.get(solved_by(variants))
-        return number(0.0) if off is None else off.at(quantity, travel["D"], self._back)
+        return number(0.0) if off is None else off.at(quantity, travel["D"], self._phase)
 
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
         """Mean shear angle of the middle zone at every reading [degrees], (n,)."""
@@ -523,6 +519,25 @@ def _backward(D: Array, speed: Array) -> Flags:
     """Where crossheads are on a way back: at rest, as before it, (n_points, n_runs)."""
     last = np.maximum.accumulate(np.where(speed != 0.0, np.arange(len(D))[:, None], 0), axis=0)
     return np.take_along_axis(speed, last, axis=0) < 0.0
+
+
+def _speed_out(D: Array, time: Array, speed: Array) -> Array:
+    """Mean speed of crossheads [mm/s] on their way to where they get furthest, (n_runs,).
+
+    While they move: the furthest place of all may be read anywhere in a hold.
+    """
+    on_its_way = (np.arange(len(D))[1:, None] <= np.argmax(D, axis=0)) & (speed[1:] > 0.0)
+    way, took = (
+        np.sum(np.where(on_its_way, np.diff(values, axis=0), 0.0), axis=0) for values in (D, time)
+    )
+    return np.asarray(way / np.maximum(took, 1e-9))
+
+
+def _phases(D: Array, speed: Array, back: Flags) -> Phases:
+    """What crossheads do, by Phase, (n_points, n_runs); where they begin they are on their way."""
+    stopped = (speed == 0.0) & ~back & (D > GONE_BACK * D.max(axis=0))
+    found = np.where(stopped, Phase.STOPPED, np.where(back, Phase.BACK, Phase.OUT))
+    return np.asarray(found, dtype=np.int8)
 
 
 def solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:

@@ -11,13 +11,12 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ...expressions.marching import Varying
-from .mixture import Part, Travels, gamma_of, of_ways
-from .solved import Solved
+from .mixture import Part, Travels, of_groups, of_ways
+from .solved import SIGN, Phase, Phases, Solved
 
 __all__ = ["Correction", "Quantity", "correction"]
 
 Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Points of each way at which they are compared.
 ALONG = 60
@@ -31,26 +30,26 @@ class Correction:
 
     Attributes:
         furthest: travel that each strip was solved up to [mm], (n_runs,).
-        force, middle: on the way out and on the way back, of each run, of the travel.
+        force, middle: by Phase, of each run, of the travel.
     """
 
     furthest: Array
     force: tuple[list[PchipInterpolator], ...]
     middle: tuple[list[PchipInterpolator], ...]
 
-    def at(self, quantity: Quantity, D: Varying, back: Flags) -> Varying:
-        """At travels [mm] on either way, (n_points, n_runs)."""
+    def at(self, quantity: Quantity, D: Varying, phase: Phases) -> Varying:
+        """At travels [mm], (n_points, n_runs)."""
         at = np.clip(D.value, 0.0, self.furthest)
 
         def found(order: int) -> Array:
-            out, other = (
-                np.stack([own(at[:, r], order) for r, own in enumerate(way)], axis=1)
-                for way in getattr(self, quantity)
-            )
-            return np.where(back, other, out)
+            lines = getattr(self, quantity)
+            total = np.zeros_like(at)
+            for one in np.unique(phase):
+                own = np.stack([line(at[:, r], order) for r, line in enumerate(lines[one])], axis=1)
+                total = np.where(phase == one, own, total)
+            return total
 
-        change = found(1)
-        return Varying(found(0), {p: change * slope for p, slope in D.slopes.items()})
+        return Varying(found(0), {p: found(1) * slope for p, slope in D.slopes.items()})
 
 
 def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Correction:
@@ -65,19 +64,20 @@ def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Corr
     area = np.stack([way.area for way in exact.ways])
     speed = np.array([way.speed for way in exact.ways])[:, None]
     off: dict[str, list[list[PchipInterpolator]]] = {"force": [], "middle": []}
-    for flag in (False, True):
-        back = np.full(D.shape, flag)
-        travels = Travels(D, back)
-        gamma, slope = (
-            gamma_of(foretold, travels, order).value.reshape(*D.shape, -1) for order in (0, 1)
+    for one in Phase:
+        phase = np.full(D.shape, one, dtype=np.int8)
+        travels = Travels(D, phase)
+        gamma, lever = (
+            of_groups(foretold, travels, name).value.reshape(*D.shape, -1)
+            for name in ("gamma", "lever")
         )
-        rate = slope * (-speed if flag else speed)
-        work = np.sum(area * slope * curve.at(gamma, rate, back[:, :, None]), axis=2)
+        moments = curve.at(gamma, lever * speed * SIGN[one], phase[:, :, None] == Phase.BACK)
+        work = np.sum(area * lever * moments, axis=2)
         force, middle = (of_ways(foretold, travels, {}, n).value for n in ("rest", "middle"))
-        of_runs = [(way, D[:, r], back[:, r]) for r, way in enumerate(exact.ways)]
+        of_runs = [(way, D[:, r], phase[:, r]) for r, way in enumerate(exact.ways)]
         for name, known, own in (
-            ("force", force + work, [way.force(d, b, curve) for way, d, b in of_runs]),
-            ("middle", middle, [way.at("middle", d, b) for way, d, b in of_runs]),
+            ("force", force + work, [way.force(d, p, curve) for way, d, p in of_runs]),
+            ("middle", middle, [way.at("middle", d, p) for way, d, p in of_runs]),
         ):
             missing = np.stack(own, axis=1) - known
             off[name].append(

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from operator import attrgetter
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -20,10 +21,14 @@ from scipy.interpolate import PchipInterpolator
 from ....errors import SolveError
 from ...measurement.schema import Measurement, Run
 from ...workers import each_of
+from .standing import AtRest
 from .strip import KNOTS, STEPS, Curve, StripPath, solved_strip, strip_case
 
 __all__ = [
     "GROUPS",
+    "Name",
+    "Phase",
+    "Phases",
     "Solved",
     "SolvedStrips",
     "Wanted",
@@ -33,6 +38,8 @@ __all__ = [
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+Phases = npt.NDArray[np.int8]
+Name = Literal["gamma", "lever", "rest", "middle"]
 
 #: Groups of crossings that go alike.
 GROUPS = 24
@@ -45,8 +52,37 @@ BETWEEN = 6
 #: Travels at which forces of strips are compared, and angles at which their work is summed.
 TRAVELS, ANGLES = 20, 480
 
+#: Way of the crosshead by Phase, in that of its way out.
+SIGN = np.array([1.0, -1.0, 0.0])
+
 Wanted = tuple[Mapping[str, Any], Curve]
 """Changed keys of the case, by their dotted names, and a curve."""
+
+Task = tuple[str, Curve, bool]
+"""A whole case, a curve, and whether the strip is wanted as it stands still."""
+
+
+class Phase(IntEnum):
+    """What a crosshead does at a reading: it is on its way out, or back, or stopped on its way out.
+
+    Stopped on its way back it is as before.
+    """
+
+    OUT, BACK, STOPPED = range(3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stopped:
+    """One run's strip as it stands still, of the travel; see Way."""
+
+    gamma: PchipInterpolator
+    lever: PchipInterpolator
+    rest: PchipInterpolator
+    middle: PchipInterpolator
+
+    def along(self, name: Name, D: Array, order: int) -> Array:
+        """Of one quantity, or a derivative in D, at travels [mm], (n, ...)."""
+        return np.asarray(getattr(self, name)(D, order))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +96,7 @@ class Way:
         middle: mean shear angle of the middle zone [rad].
         speed: dD/dt [mm/s], negative on the way back.
         back: the way back; None where it is taken to be the way out.
+        stopped: where the crosshead stands still; None where that is taken to be the way out.
     """
 
     area: Array
@@ -68,21 +105,37 @@ class Way:
     middle: PchipInterpolator
     speed: float
     back: Way | None = None
+    stopped: Stopped | None = None
 
-    def at(self, name: str, D: Array, back: Flags, order: int = 0) -> Array:
-        """Angles, rest or middle, or a derivative in D, at travels [mm] on either way, (n, ...)."""
-        found = np.asarray(getattr(self, name)(D, order))
-        if self.back is None or not back.any():
-            return found
-        flags = back.reshape(-1, *([1] * (found.ndim - 1)))
-        return np.where(flags, getattr(self.back, name)(D, order), found)
+    def at(self, name: Name, D: Array, phase: Phases, order: int = 0) -> Array:
+        """Angles, rest, middle, or the lever dγ/dD of moments, at travels [mm], (n, ...).
 
-    def force(self, D: Array, back: Flags, curve: Curve) -> Array:
+        Args:
+            name: which of them.
+            D: travels, (n,).
+            phase: what the crosshead does there, (n,).
+            order: of a derivative in D.
+        """
+        found = self.along(name, D, order)
+        for one, other in ((Phase.BACK, self.back), (Phase.STOPPED, self.stopped)):
+            flags = phase == one
+            if other is not None and flags.any():
+                flags = flags.reshape(-1, *([1] * (found.ndim - 1)))
+                found = np.where(flags, other.along(name, D, order), found)
+        return found
+
+    def along(self, name: Name, D: Array, order: int) -> Array:
+        """The same of the way out by itself."""
+        if name == "lever":
+            return np.asarray(self.gamma(D, order + 1))
+        return np.asarray(getattr(self, name)(D, order))
+
+    def force(self, D: Array, phase: Phases, curve: Curve) -> Array:
         """Force [N] of a strip that goes as it was solved, with a curve, at some travels, (n,)."""
-        flags, slope = back[:, None], self.at("gamma", D, back, 1)
-        rate = slope * np.where(flags, -self.speed, self.speed)
-        work = self.area * slope * curve.at(self.at("gamma", D, back), rate, flags)
-        return np.asarray(self.at("rest", D, back) + work.sum(axis=1))
+        gamma, lever = self.at("gamma", D, phase), self.at("lever", D, phase)
+        rate = lever * self.speed * SIGN[phase][:, None]
+        work = self.area * lever * curve.at(gamma, rate, phase[:, None] == Phase.BACK)
+        return np.asarray(self.at("rest", D, phase) + work.sum(axis=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +189,8 @@ class SolvedStrips:
         furthest: travel that each strip is solved up to [mm], (n_runs,).
         speed: at which [mm/s], (n_runs,).
         back: whether it is let back as well, (n_runs,).
-        paths: of strips that were solved before, by their case and curve; is added to.
+        stops: whether it is wanted as it stands still, too, (n_runs,).
+        paths: of strips that were solved before, by what they were solved with; is added to.
 
     Attributes:
         paths: as given.
@@ -152,9 +206,11 @@ class SolvedStrips:
         furthest: Array,
         speed: Array,
         back: Flags,
-        paths: dict[tuple[str, Curve], StripPath],
+        stops: Flags,
+        paths: dict[Task, StripPath],
     ) -> None:
-        self._runs, self._furthest, self._strips = list(runs), furthest, (furthest, speed, back)
+        self._runs, self._furthest = list(runs), furthest
+        self._strips = furthest, speed, back, stops
         self._groups: dict[int, npt.NDArray[np.int64]] = {}
         self._known: dict[str, list[Solved]] = {}
         self.paths = paths
@@ -227,19 +283,19 @@ class SolvedStrips:
         self, wanted: Sequence[tuple[int, Mapping[str, Any], Curve]], steps: int
     ) -> list[StripPath | Exception]:
         """Of each run with its changes and curve what is known, or is solved now."""
-        tasks: dict[tuple[str, Curve], tuple[Any, Curve]] = {}
-        places = []
+        tasks: dict[Task, tuple[Any, Curve, bool]] = {}
+        places: list[Task] = []
         for run, changes, curve in wanted:
             measurement, own = self._runs[run]
-            travel, pace, back = (of[run] for of in self._strips)
+            travel, pace, back, stops = (of[run] for of in self._strips)
             case = strip_case(
                 measurement, own, float(travel), float(pace), changes, steps, bool(back)
             )
-            places.append((case.model_dump_json(), curve))
+            places.append((case.model_dump_json(), curve, bool(stops)))
             if places[-1] not in self.paths:
-                tasks.setdefault(places[-1], (case, curve))
+                tasks.setdefault(places[-1], (case, curve, bool(stops)))
         order = sorted(tasks, key=lambda key: -tasks[key][0].length_mm * tasks[key][0].width_mm)
-        stopped: dict[tuple[str, Curve], Exception] = {}
+        stopped: dict[Task, Exception] = {}
         results = each_of(solved_strip, [tasks[key] for key in order])
         for key, path in zip(order, results, strict=True):
             if isinstance(path, Exception):
@@ -302,9 +358,9 @@ class SolvedStrips:
         off, size = [], []
         for new, old, furthest in zip(found.ways, before.ways, self._furthest, strict=True):
             D = np.tile(np.linspace(0.0, furthest, TRAVELS)[1:], 2)
-            back = np.arange(len(D)) >= TRAVELS - 1
-            force = new.force(D, back, found.curve)
-            off.append(force - old.force(D, back, found.curve))
+            phase = np.repeat(np.array([Phase.OUT, Phase.BACK], dtype=np.int8), TRAVELS - 1)
+            force = new.force(D, phase, found.curve)
+            off.append(force - old.force(D, phase, found.curve))
             size.append(force)
         return float(np.linalg.norm(np.concatenate(off)) / np.linalg.norm(np.concatenate(size)))
 
@@ -353,8 +409,7 @@ def reached(solved: Solved, furthest: Array) -> Array:
 
 def _way(path: StripPath, group: npt.NDArray[np.int64], curve: Curve) -> Way:
     """A path, and its way back, with its crossings in groups."""
-    area = np.bincount(group, path.area, GROUPS).astype(np.float64)
-    gamma = np.stack([np.bincount(group, path.area * row, GROUPS) / area for row in path.gamma])
+    area, gamma = _together(path.gamma, path.area, group)
     of_travel = PchipInterpolator(path.travel, gamma)
     # Between its steps too the force is that of the strip: slopes of the angles are not smooth.
     count = BETWEEN * (len(path.travel) - 1) + 1
@@ -369,7 +424,23 @@ def _way(path: StripPath, group: npt.NDArray[np.int64], curve: Curve) -> Way:
         PchipInterpolator(path.travel, path.middle),
         path.speed,
         None if path.back is None else _way(path.back, group, curve.back or curve),
+        None if path.rest is None else _stopped(path, path.rest, group, curve),
     )
+
+
+def _stopped(path: StripPath, rest: AtRest, group: npt.NDArray[np.int64], curve: Curve) -> Stopped:
+    """A strip as it stands still, with its crossings in groups."""
+    area, gamma = _together(rest.gamma, path.area, group)
+    _, lever = _together(rest.lever, path.area, group)
+    force = rest.force - np.sum(area * lever * curve(gamma), axis=1)
+    each = (PchipInterpolator(path.travel, v) for v in (gamma, lever, force, rest.middle))
+    return Stopped(*each)
+
+
+def _together(values: Array, area: Array, group: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+    """Areas of the groups of crossings, (GROUPS,), and means over them, (n, GROUPS)."""
+    whole = np.bincount(group, area, GROUPS).astype(np.float64)
+    return whole, np.stack([np.bincount(group, area * row, GROUPS) / whole for row in values])
 
 
 def _key(changes: Mapping[str, Any]) -> str:

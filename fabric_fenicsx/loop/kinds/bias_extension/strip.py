@@ -29,11 +29,13 @@ from ....rigs.cases import SolverKeys
 from ....rigs.common import Session, control, tow_sections
 from ....rigs.crosshead import crosshead, duration
 from ....solving.model import Model
+from ....solving.newton import Newton
 from ....solving.sections import diagonals
 from ....solving.snapshot import Snapshot
 from ....solving.stepping import Step, Stepper
 from ...measurement.case import measured_case, tow_of
 from ...measurement.schema import FILE, Measurement, Run
+from .standing import AtRest, Standing
 
 __all__ = ["KNOTS", "Curve", "StripPath", "pulled", "solved_strip", "strip_case"]
 
@@ -123,6 +125,7 @@ class StripPath:
         area: of fabric that each crossing stands for [mm²], (n_crossings,).
         speed: dD/dt [mm/s], negative on the way back.
         back: its way back from there; None where it was not solved.
+        rest: where it stands still at each of these travels; None where that was not solved.
     """
 
     travel: Array
@@ -132,6 +135,7 @@ class StripPath:
     area: Array
     speed: float
     back: StripPath | None = None
+    rest: AtRest | None = None
 
 
 def strip_case(
@@ -190,6 +194,7 @@ def pulled(
     case: BiasExtensionCase,
     corners: Iterable[float],
     seen: Callable[[Snapshot], None] = lambda snapshot: None,
+    kept: Callable[[Newton, float], None] = lambda newton, time: None,
 ) -> tuple[Array, Array, Array]:
     """Pull a strip from its rest on.
 
@@ -199,6 +204,7 @@ def pulled(
         corners: times at which its motion changes, the end at last [s]; each is asked for when the
             one before it has been reached.
         seen: given each step's snapshot.
+        kept: given the solver and the time where that has become the state to go on from.
 
     Returns:
         Times [s], forces of the crosshead [N] and mean angles between the tows' axes in the middle
@@ -218,7 +224,13 @@ def pulled(
 
     keys = case.solver
     newton = model.newton(force_tolerance=keys.force_tolerance_N, limit=keys.iteration_limit)
-    stepper = Stepper(model, newton, control(keys), observe=observe)
+    stepper = Stepper(
+        model,
+        newton,
+        control(keys),
+        observe=observe,
+        keep=lambda step: kept(newton, step.time),
+    )
     for corner in corners:
         stepper.run(corner)
         stepper.predictor.forget()
@@ -226,8 +238,13 @@ def pulled(
     return time, force, angle
 
 
-def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:
+def solved_strip(case: BiasExtensionCase, curve: Curve, stops: bool = False) -> StripPath:
     """Pull a strip on this rank alone, and let it back where the case says so.
+
+    Args:
+        case: of the strip.
+        curve: of its crossings.
+        stops: whether it is wanted as it stands still on its way out, too.
 
     Raises:
         InputError: there is no such strip.
@@ -246,13 +263,13 @@ def solved_strip(case: BiasExtensionCase, curve: Curve) -> StripPath:
     strip = _strip(case.model_copy(update=built).model_dump_json())
     strip.put_at_rest(case, curve)
     try:
-        return strip.pulled(case, curve)
+        return strip.pulled(case, curve, stops)
     except SolveError:
         if not case.unload:
             raise
     # The way out may be had without the way back.
     strip.put_at_rest(case, curve)
-    return strip.pulled(case.model_copy(update={"unload": False}), curve)
+    return strip.pulled(case.model_copy(update={"unload": False}), curve, stops)
 
 
 @dataclass(frozen=True)
@@ -339,8 +356,8 @@ class _Strip:
         for table in self._tables:
             table.exchange(curve, self._area)
 
-    def pulled(self, case: BiasExtensionCase, curve: Curve) -> StripPath:
-        """Pull it, and let it back with the curve of that way."""
+    def pulled(self, case: BiasExtensionCase, curve: Curve, stops: bool) -> StripPath:
+        """Pull it, stop it after each step if so wanted, let it back with the curve of that way."""
         model = self._model
         places, spacings = model.net.points[model.net.crossings[:, 0]], case.spacings
         area = case.strip.shares(places, spacings) * spacings[0] * spacings[1]
@@ -354,8 +371,18 @@ class _Strip:
                 self._take(curve.back or curve)
                 yield end
 
+        # Where nothing slips all goes back to what the way out has, but for the dashpots.
+        assert model.crossings is not None
+        standing = (
+            Standing(model, case) if stops and model.crossings.slip_limit is not None else None
+        )
+
+        def kept(newton: Newton, time: float) -> None:
+            if standing is not None and time <= out * (1.0 + 1e-9):
+                standing.stop(newton, time)
+
         time, force, middle = pulled(
-            model, case, corners(), lambda snapshot: angles.append(snapshot.director_turn)
+            model, case, corners(), lambda snapshot: angles.append(snapshot.director_turn), kept
         )
         travel = np.array([crosshead(case, t) for t in time])
         gamma, turn = np.array(angles), int(np.argmin(np.abs(time - out))) + 1
@@ -367,4 +394,4 @@ class _Strip:
 
         # Of the turn itself the way back has no force: the moments have just changed.
         back = path(slice(None, turn - 1, -1), -speed) if case.unload else None
-        return path(slice(turn), speed, back)
+        return path(slice(turn), speed, back, None if standing is None else standing.found())

@@ -1,0 +1,141 @@
+"""A strip whose crosshead stands still: its force then, and how its crossings would go on.
+
+While a strip is pulled dashpots act, and tows slip at crossings whose force is at the limit. Where
+the crosshead stops dashpots let go, all forces fall, those of crossings below the limit: what has
+slipped stays so, and friction no longer pulls. Angles settle in a balance without rates. About it
+the strip answers as one whose crossings hold: a little more of a moment m_c at a crossing changes
+the force that keeps the crosshead where it is by
+
+    δF = A_c dγ_c/dD δm_c
+
+with dγ_c/dD of the next bit of travel on which none of them slips (Maxwell and Betti: the tangent
+is symmetric). On the way that the strip was pulled some of each bit is slip, and dγ_c/dD less.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ....errors import SolveError
+from ....rigs.bias_extension import BiasExtensionCase, clamps, middle_zone
+from ....rigs.crosshead import crosshead
+from ....solving.model import Model
+from ....solving.newton import Newton
+
+__all__ = ["AtRest", "Standing"]
+
+Array = npt.NDArray[np.float64]
+
+#: Share of the whole travel that derivatives are taken over: a change of 1e-4 or so of an angle.
+SHARE = 1e-4
+#: Times after which a strip is looked at on its way to rest, as shares of how long it was pulled.
+WAITS = (1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0)
+#: A limit of slip [N] that no crossing comes to.
+NEVER = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class AtRest:
+    """A strip that stands still at each of some travels, the first of them 0.
+
+    Attributes:
+        force: of the crosshead [N], (n,).
+        gamma: shear angles that the crossings feel [rad], (n, n_crossings).
+        middle: mean angle between the tows' axes in the middle zone [rad], (n,).
+        lever: dγ/dD while no crossing slips [rad/mm], (n, n_crossings).
+    """
+
+    force: Array
+    gamma: Array
+    middle: Array
+    lever: Array
+
+
+class Standing:
+    """Stops a strip wherever it is, and lets it go on as if it had not been.
+
+    Args:
+        model: of the strip, alone on its rank.
+        case: of it.
+    """
+
+    def __init__(self, model: Model, case: BiasExtensionCase) -> None:
+        self._model, self._case = model, case
+        self._upper, self._middle = clamps(model.net, case)[1], middle_zone(model.net, case)[0]
+        self._rows: list[tuple[float, Array, float, Array]] = []
+
+    def stop(self, newton: Newton, time: float) -> None:
+        """Let the accepted state at a time [s] come to rest, note it, and put back what it was.
+
+        Raises:
+            SolveError: there is no such balance.
+        """
+        model = self._model
+        self._settle(newton, time)
+        snapshot = model.snapshot(time)
+        force = float(model.reactions()[self._upper, 1].sum())
+        middle = float(snapshot.shear_angle[self._middle].mean())
+        lever = self._lever(newton, time)
+        self._rows.append((force, snapshot.director_turn, middle, lever))
+        newton.x.set(0.0)
+        model.system.set_increment(newton.x)
+
+    def _settle(self, newton: Newton, time: float) -> None:
+        """Solve for the increment to the balance without rates; see stop."""
+        model, still = self._model, np.zeros(len(self._model.fixed))
+        outcome = None
+        # All at once is too much for fast strips: as after longer and longer times, each from what
+        # the one before found.
+        for waits in ((), WAITS):
+            newton.x.set(0.0)
+            for share in waits:
+                model.set_rates_of_change(share * time)
+                if not newton.solve(still).converged:
+                    break
+            model.hold_still()
+            outcome = newton.solve(still)
+            if outcome.converged:
+                return
+        assert outcome is not None
+        raise SolveError(f"held at t = {time:.6g} s: {outcome.reason}")
+
+    def _lever(self, newton: Newton, time: float) -> Array:
+        """Change of the angles by the travel about the increment in the fields."""
+        model, crossings = self._model, self._model.crossings
+        assert crossings is not None
+        limit = crossings.slip_limit
+        slips_at = None if limit is None else float(limit.value)
+        whole = 60.0 * self._case.travel_mm / self._case.rate_mm_min
+        # The crosshead is on its way, so that it comes from one side where it goes no further.
+        other = time + SHARE * whole * (1.0 if time < 0.5 * whole else -1.0)
+        change = crosshead(self._case, other) - crosshead(self._case, time)
+        place = newton.x.array.copy()
+        if limit is not None:
+            limit.value = NEVER
+        try:
+            b = model.disc.vector()
+            b.array[model.fixed] = model.targets(time, other)
+            way = newton.factorised()(b).array.copy()
+            angles = []
+            for sign in (1.0, -1.0):
+                newton.x.array[:] = place + sign * way
+                model.system.set_increment(newton.x)
+                angles.append(model.shear_angles())
+        finally:
+            if limit is not None:
+                limit.value = slips_at
+        return np.asarray((angles[0] - angles[1]) / (2.0 * change))
+
+    def found(self) -> AtRest:
+        """All that was noted, behind the strip as it was made, which answers as in the first."""
+        force, gamma, middle, lever = (np.array(v) for v in zip(*self._rows, strict=True))
+        nothing = np.zeros_like(gamma[:1])
+        return AtRest(
+            np.append(0.0, force),
+            np.concatenate([nothing, gamma]),
+            np.append(0.0, middle),
+            np.concatenate([lever[:1], lever]),
+        )
