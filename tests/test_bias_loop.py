@@ -19,7 +19,8 @@ from fabric_fenicsx.loop.kinds.bias_extension.frame_law import (
     locking_variant,
 )
 from fabric_fenicsx.loop.kinds.bias_extension.mixture import Travels
-from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension, _backward
+from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
+from fabric_fenicsx.loop.kinds.bias_extension.phases import backward
 from fabric_fenicsx.loop.kinds.bias_extension.quantities import read_together
 from fabric_fenicsx.loop.kinds.bias_extension.solved import Way
 from fabric_fenicsx.loop.kinds.bias_extension.strip import (
@@ -196,7 +197,7 @@ def test_what_is_pulled_once_is_not_solved_back(strip):
     # At rest a crosshead is on the way that it came.
     D = np.array([0.0, 1.0, 1.0, 0.5, 0.5, 1.0])[:, None]
     speed = np.array([1.0, 1.0, 0.0, -1.0, 0.0, 1.0])[:, None]
-    assert _backward(D, speed)[:, 0].tolist() == [False, False, False, True, True, False]
+    assert backward(D, speed)[:, 0].tolist() == [False, False, False, True, True, False]
 
 
 @pytest.mark.parametrize(

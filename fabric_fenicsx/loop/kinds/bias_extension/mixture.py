@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...expressions.marching import Varying
-from .solved import GROUPS, Name, Phases, Solved
+from .phases import Phases
+from .solved import GROUPS, Name, Solved
 
 __all__ = ["Part", "Travels", "number", "of_groups", "of_ways"]
 

@@ -38,9 +38,10 @@ from ..records import shifted
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
 from .mixture import Part, Travels, number, of_groups, of_ways
+from .phases import GONE_BACK, Phase, backward, moving, phases_of, speed_out
 from .quantities import first_curve, read_together, strip_of
 from .settled import Correction, Quantity, correction
-from .solved import GROUPS, Phase, Phases, Solved, SolvedStrips, Wanted, reached
+from .solved import GROUPS, Solved, SolvedStrips, Wanted, reached
 from .strip import FINE_STEPS, KNOTS, Curve, strip_case
 from .terms import strip_terms
 
@@ -56,8 +57,6 @@ PACE = 1.5
 ALONG = 60
 #: Parameter of the baseline's dashpot.
 DASHPOT = "c1_N_s"
-#: Share of its travel that a strip must have been let back by: less is the noise of a record.
-GONE_BACK = 0.02
 #: Share by which a curve, a slip or a crimp may differ from those that a fit was solved with.
 SETTLED = 0.02
 #: Sets of strips of which it is kept how their crossings go.
@@ -176,7 +175,8 @@ class BiasExtension(CrossheadTest):
     def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
         D, time = self._points["D"].value, self._points["time"].value
         self._runs = list(runs)
-        speed = _speed_out(D, time, self._points["D_rate"].value)
+        rate = moving(self._points["D_rate"].value)
+        speed = speed_out(D, time, rate)
         # Strips alike are solved once, as far as the furthest of them goes.
         own_pace = np.log(speed)[self._parent]
         paces = np.round(own_pace / np.log(PACE))
@@ -184,11 +184,11 @@ class BiasExtension(CrossheadTest):
         same = [[other == own for other in kinds] for own in kinds]
         self._furthest = np.array([D.max(axis=0)[own].max() for own in same])
         self._speed = np.exp([own_pace[own].mean() for own in same])
-        self._back = _backward(D, self._points["D_rate"].value)
+        self._back = backward(D, rate)
         gone = np.max(np.where(self._back, self._furthest - D, 0.0), axis=0)
         back = np.array([gone[own].max() for own in same]) > GONE_BACK * self._furthest
         self._back &= back
-        self._phase = _phases(D, self._points["D_rate"].value, self._back)
+        self._phase = phases_of(D, rate, self._back)
         stopped = (self._phase == Phase.STOPPED).any(axis=0)
         stops = np.array([stopped[own].any() for own in same])
         self._recorded_travels = Travels(D, self._phase, kept=True)
@@ -513,31 +513,6 @@ def _laws(variants: Sequence[Variant]) -> list[FrameVariant | None]:
     """The baseline's laws and those of forms; see BiasExtension._along."""
     own = [v for v in variants if isinstance(v, FrameVariant) and v.laws is not None]
     return [None, *own]
-
-
-def _backward(D: Array, speed: Array) -> Flags:
-    """Where crossheads are on a way back: at rest, as before it, (n_points, n_runs)."""
-    last = np.maximum.accumulate(np.where(speed != 0.0, np.arange(len(D))[:, None], 0), axis=0)
-    return np.take_along_axis(speed, last, axis=0) < 0.0
-
-
-def _speed_out(D: Array, time: Array, speed: Array) -> Array:
-    """Mean speed of crossheads [mm/s] on their way to where they get furthest, (n_runs,).
-
-    While they move: the furthest place of all may be read anywhere in a hold.
-    """
-    on_its_way = (np.arange(len(D))[1:, None] <= np.argmax(D, axis=0)) & (speed[1:] > 0.0)
-    way, took = (
-        np.sum(np.where(on_its_way, np.diff(values, axis=0), 0.0), axis=0) for values in (D, time)
-    )
-    return np.asarray(way / np.maximum(took, 1e-9))
-
-
-def _phases(D: Array, speed: Array, back: Flags) -> Phases:
-    """What crossheads do, by Phase, (n_points, n_runs); where they begin they are on their way."""
-    stopped = (speed == 0.0) & ~back & (D > GONE_BACK * D.max(axis=0))
-    found = np.where(stopped, Phase.STOPPED, np.where(back, Phase.BACK, Phase.OUT))
-    return np.asarray(found, dtype=np.int8)
 
 
 def solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:

@@ -12,7 +12,8 @@ from scipy.interpolate import PchipInterpolator
 
 from ...expressions.marching import Varying
 from .mixture import Part, Travels, of_groups, of_ways
-from .solved import SIGN, Phase, Phases, Solved
+from .phases import SIGN, Phase, Phases
+from .solved import Solved
 
 __all__ = ["Correction", "Quantity", "correction"]
 

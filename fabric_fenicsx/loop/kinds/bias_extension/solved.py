@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -21,14 +20,13 @@ from scipy.interpolate import PchipInterpolator
 from ....errors import SolveError
 from ...measurement.schema import Measurement, Run
 from ...workers import each_of
+from .phases import SIGN, Phase, Phases
 from .standing import AtRest
 from .strip import KNOTS, STEPS, Curve, StripPath, solved_strip, strip_case
 
 __all__ = [
     "GROUPS",
     "Name",
-    "Phase",
-    "Phases",
     "Solved",
     "SolvedStrips",
     "Wanted",
@@ -38,7 +36,6 @@ __all__ = [
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
-Phases = npt.NDArray[np.int8]
 Name = Literal["gamma", "lever", "rest", "middle"]
 
 #: Groups of crossings that go alike.
@@ -52,23 +49,11 @@ BETWEEN = 6
 #: Travels at which forces of strips are compared, and angles at which their work is summed.
 TRAVELS, ANGLES = 20, 480
 
-#: Way of the crosshead by Phase, in that of its way out.
-SIGN = np.array([1.0, -1.0, 0.0])
-
 Wanted = tuple[Mapping[str, Any], Curve]
 """Changed keys of the case, by their dotted names, and a curve."""
 
 Task = tuple[str, Curve, bool]
 """A whole case, a curve, and whether the strip is wanted as it stands still."""
-
-
-class Phase(IntEnum):
-    """What a crosshead does at a reading: it is on its way out, or back, or stopped on its way out.
-
-    Stopped on its way back it is as before.
-    """
-
-    OUT, BACK, STOPPED = range(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
