@@ -58,7 +58,7 @@ class Standing:
     """Stops a strip wherever it is, and lets it go on as if it had not been.
 
     Args:
-        model: of the strip, alone on its rank.
+        model: of the strip, whose tows slip, alone on its rank.
         case: of it.
     """
 
@@ -85,8 +85,7 @@ class Standing:
 
     def _settle(self, newton: Newton, time: float) -> None:
         """Solve for the increment to the balance without rates; see stop."""
-        model, still = self._model, np.zeros(len(self._model.fixed))
-        outcome = None
+        model, still, reason = self._model, np.zeros(len(self._model.fixed)), ""
         # All at once is too much for fast strips: as after longer and longer times, each from what
         # the one before found.
         for waits in ((), WAITS):
@@ -99,22 +98,21 @@ class Standing:
             outcome = newton.solve(still)
             if outcome.converged:
                 return
-        assert outcome is not None
-        raise SolveError(f"held at t = {time:.6g} s: {outcome.reason}")
+            reason = outcome.reason
+        raise SolveError(f"held at t = {time:.6g} s: {reason}")
 
     def _lever(self, newton: Newton, time: float) -> Array:
         """Change of the angles by the travel about the increment in the fields."""
         model, crossings = self._model, self._model.crossings
-        assert crossings is not None
+        assert crossings is not None and crossings.slip_limit is not None
         limit = crossings.slip_limit
-        slips_at = None if limit is None else float(limit.value)
+        slips_at = float(limit.value)
         whole = 60.0 * self._case.travel_mm / self._case.rate_mm_min
         # The crosshead is on its way, so that it comes from one side where it goes no further.
         other = time + SHARE * whole * (1.0 if time < 0.5 * whole else -1.0)
         change = crosshead(self._case, other) - crosshead(self._case, time)
         place = newton.x.array.copy()
-        if limit is not None:
-            limit.value = NEVER
+        limit.value = NEVER
         try:
             b = model.disc.vector()
             b.array[model.fixed] = model.targets(time, other)
@@ -125,8 +123,7 @@ class Standing:
                 model.system.set_increment(newton.x)
                 angles.append(model.shear_angles())
         finally:
-            if limit is not None:
-                limit.value = slips_at
+            limit.value = slips_at
         return np.asarray((angles[0] - angles[1]) / (2.0 * change))
 
     def found(self) -> AtRest:
