@@ -46,7 +46,7 @@ from .loop.kinds.cantilever.variant import StripVariant as StripVariant
 from .loop.kinds.drape.model import Drape as Drape
 from .loop.kinds.drape.variant import DrapeVariant as DrapeVariant
 from .loop.kinds.picture_frame.rig_terms import of_the_rig as of_the_rig
-from .loop.kinds.picture_frame.terms import of_the_run as of_the_run
+from .loop.kinds.picture_frame.run_terms import of_the_run as of_the_run
 from .loop.kinds.picture_frame.variant import FrameVariant as FrameVariant
 from .loop.report.figures import data_figure as data_figure
 from .loop.report.residuals import residual_figure as residual_figure
@@ -54,6 +54,7 @@ from .loop.synthesise import Hidden as Hidden
 from .loop.synthesise import synthesise as synthesise
 from .loop.synthesise import write_measurement as write_measurement
 from .mechanics.laws import LAWS as LAWS
+from .mechanics.laws.lagging import Lagging as Lagging
 from .mechanics.laws.law import Crossing as Crossing
 from .mechanics.laws.law import CrossingLaw as CrossingLaw
 from .mechanics.laws.law import Form as Form

@@ -131,6 +131,21 @@ def test_what_strips_say_is_evaluated_once_and_the_same(strip, monkeypatch):
     assert all(np.array_equal(other_slopes[name], slope) for name, slope in slopes.items())
 
 
+def test_only_strips_whose_holds_are_read_are_solved_standing_still():
+    """A record that is shorter than another's rests at its end; that is no hold."""
+    short, long = pulled(count=15), pulled(length=100.0)
+    held = pulled(count=15, length=60.0)
+    D, time = held.columns["displacement_mm"], held.columns["time_s"]
+    columns = {
+        "time_s": np.append(time, time[-1] + [5.0, 10.0]),
+        "displacement_mm": np.append(D, [TRAVEL, TRAVEL]),
+        "force_N": np.zeros(len(D) + 2),
+    }
+    strips = BiasExtension([measured(short, long, replace(held, columns=columns))])
+    *_, stops = strips._strips._strips
+    assert stops.tolist() == [False, False, True]
+
+
 def test_a_dashpot_costs_its_work():
     run = pulled(speed=4.0)
     values = {"k1_N": 0.02, "k3_N": 0.2, "c1_N_s": 0.05}

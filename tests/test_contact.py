@@ -17,6 +17,7 @@ from fabric_fenicsx.fabric.section import RectangularSection
 from fabric_fenicsx.mechanics.contact import LIMIT, NEAR_LIMIT
 from fabric_fenicsx.mechanics.tools import HoledPlate
 from fabric_fenicsx.output.results import read_net
+from fabric_fenicsx.output.steps import StepFile
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.common import Session
 from fabric_fenicsx.rigs.drape import DrapeCase
@@ -132,8 +133,8 @@ def drawn(folder, *, comm, resume=False, **keys):
 
 
 def last_step(folder):
-    with np.load(max(folder.glob("steps/*.npz"))) as file:
-        return {name: file[name] for name in file.files}
+    with StepFile(max(folder.glob("steps/*.npz"))) as step:
+        return {name: step[name] for name in step.names}
 
 
 @pytest.fixture(scope="module")

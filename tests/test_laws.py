@@ -48,6 +48,15 @@ TOGETHER: dict[str, dict[str, Any]] = {
     "compaction": {"width_mm": 1.6, "spacing_mm": 1.7, "weft_spacing_mm": 1.8},
     "tabulated_spring": {"angles_deg": [0, 9, 20, 30], "moments_N_mm": [0, 0.01, 0.02, 0.06]},
     "tabulated_dashpot": {"rates_rad_s": [0, 0.01, 0.1], "moments_N_mm": [0, 0.01, 0.04]},
+    "lagging": {
+        "coefficients_N_mm": [0.02, 0.01],
+        "reach": 0.6,
+        "shape": "spline",
+        "even": False,
+        "memory_s": 20.0,
+        "pulls": 0,
+        "by": "angle",
+    },
     "sliding_friction": {"rounding_rad_s": 1e-3},
     "coulomb_friction": {"growth_1_rad": 0},
     "shaped": {
@@ -408,15 +417,37 @@ def test_moments_on_one_way_alone(base, gamma, before, moment):
         {"base": "rest", "constant": 0.02},
         {"base": "odd", "variable": "angle", "shape": "periodic", "width": 0.3},
         {"base": "elastic", "variable": "recent_square_of_angle", "reach": 0.3, "memory_s": 20.0},
+        {"base": "dissipative", "variable": "since_reversal", "reach": 0.3, "constant": 0.5},
         {"base": "outward", "variable": "rate", "reach": 0.1},
         {"base": "forward", "variable": "rate", "reach": 0.1},
         {"base": "flowing", "variable": "angle", "exponent": 3.0, "flow_rate_rad_s": 0.02},
-        {"base": "lagging", "variable": "angle", "memory_s": 20.0, "constant": 0.0},
     ],
-    ids=["state of rest", "wave", "mean square", "way out", "way on", "flow", "lag"],
+    ids=[
+        "state of rest",
+        "wave",
+        "mean square",
+        "since the last turn",
+        "way out",
+        "way on",
+        "flow",
+    ],
 )
 def test_other_factors_are_the_same_in_both(numbers):
     compare_net_and_crossing(sample("shaped") | numbers)
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        {"even": True, "growth": 0.5},
+        {"pulls": 1},
+        {"memory_s": None, "play_deg": 3.0},
+        {"by": "rate", "reach": 0.1},
+    ],
+    ids=["even and ageing", "cord", "play", "late"],
+)
+def test_what_lags_is_the_same_in_both(numbers):
+    compare_net_and_crossing(sample("lagging") | numbers)
 
 
 @pytest.mark.parametrize(

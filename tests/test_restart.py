@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from test_rigs import SMALL
 
+from fabric_fenicsx.output.steps import StepFile
 from fabric_fenicsx.rigs import drape
 from fabric_fenicsx.rigs.common import Session
 from fabric_fenicsx.rigs.drape import DrapeCase
@@ -30,6 +31,12 @@ CASE = SMALL | {
     "solver": {"force_tolerance_N": 1e-7, "iteration_limit": 25},
 }
 MEMORIES = {"Maxwell branch", "Coulomb friction", "slip along", "traction", "height"}
+
+
+def arrays(path):
+    """All arrays of a step, whole."""
+    with StepFile(path) as file:
+        return {name: file[name] for name in file.names}
 
 
 @pytest.mark.slow
@@ -55,9 +62,9 @@ def test_resume_on_another_number_of_ranks(tmp_path):
         shutil.copytree(whole / "paraview", again / "paraview")
         shutil.copy(whole / "steps.csv", again)
         files = sorted((again / "steps").glob("*.npz"))
-        with np.load(files[len(files) // 2]) as middle:
+        with StepFile(files[len(files) // 2]) as middle:
             for memory in MEMORIES:
-                names = [name for name in middle.files if memory in name]
+                names = [name for name in middle.names if memory in name]
                 assert names and all(np.abs(middle[name]).max() > 0.0 for name in names), memory
         for file in files[len(files) // 2 + 1 :]:
             file.unlink()
@@ -65,7 +72,7 @@ def test_resume_on_another_number_of_ranks(tmp_path):
     run(world, again, resume=True)
     if world.rank == 0:
         ends = [sorted((folder / "steps").glob("*.npz"))[-1] for folder in (whole, again)]
-        one, other = (dict(np.load(file)) for file in ends)
+        one, other = map(arrays, ends)
         assert one.keys() == other.keys()
         assert one["number"] == other["number"]
         for name in (name for name in one if one[name].dtype.kind == "f"):

@@ -148,7 +148,7 @@ CASES = {
         {"heavier": lambda s: 1.0 + 2.0 * bell(s / 250, 0.6, 0.1)},
     ),
     "weight at the end": (
-        ("load_of_arc_length", "decay, from the free end"),
+        ("load_of_arc_length_and_length", "decay, from the free end"),
         {"1": 3.0, "width": 0.1},
         None,
     ),
@@ -334,6 +334,49 @@ def test_zeros_of_runs_are_a_term(tmp_path):
     assert same == pytest.approx(found.expected, abs=1e-6)
 
 
+def handled(made, held=3):
+    """A strip at five overhangs one after another, of which one is held out."""
+    lengths = (LENGTH, 150.0, 200.0, LENGTH, 150.0)
+    each = [strips((length,), count=12, **made(k)) for k, length in enumerate(lengths)]
+    runs = tuple(
+        replace(one.runs[0], file=f"{k}.csv", holdout=k == held) for k, one in enumerate(each)
+    )
+    return Cantilever([replace(each[0], runs=runs)])
+
+
+@pytest.mark.parametrize(
+    ("term", "label", "made"),
+    [
+        (
+            "bending_moment_of_run",
+            "by turns",
+            lambda run: {"stiffer": lambda s: 1.0 + 0.2 * (run % 2)},
+        ),
+        ("rest_curvature_of_run", "by turns", lambda run: {"rest": lambda s: 4e-4 * (-1) ** run}),
+        ("load_of_run", "step", lambda run: {"heavier": lambda s: 1.2 if run > 1 else 1.0}),
+    ],
+)
+def test_a_strip_that_is_turned_over_or_that_something_happens_to(term, label, made):
+    """The last of the runs is foretold by those before it."""
+    experiment = handled(made, held=4)
+    variant = form_of(experiment, term, label)
+    readings, white = experiment.readings, Variances(Noise(0.05))
+    fits = [
+        fit(
+            experiment,
+            (variant,),
+            {"C1_MPa": C1} | {p.name: 0.0 for p in variant.parameters} | start,
+            readings.fit,
+            white,
+        )
+        for start in variant.grid(amplitudes=False)
+    ]
+    found = min(fits, key=lambda one: one.sum_of_squares)
+    without = fit(experiment, (), {"C1_MPa": C1}, readings.fit, white)
+    assert without.rms(readings.fit) > 0.5
+    assert found.rms(readings.fit) < 0.03 and found.rms(readings.holdout) < 0.03
+
+
 @pytest.mark.parametrize(
     ("term", "made"),
     [
@@ -344,12 +387,7 @@ def test_zeros_of_runs_are_a_term(tmp_path):
 )
 def test_a_strip_that_is_handled_changes_from_run_to_run(term, made):
     """The right term leaves what a tow is off the elastica, and is as large as was put in."""
-    lengths = (LENGTH, 150.0, 200.0, LENGTH, 150.0)
-    each = [strips((length,), count=12, **made(k)) for k, length in enumerate(lengths)]
-    runs = tuple(
-        replace(one.runs[0], file=f"{k}.csv", holdout=k == 3) for k, one in enumerate(each)
-    )
-    experiment = Cantilever([replace(each[0], runs=runs)])
+    experiment = handled(made)
     variant = form_of(experiment, term, "linear")
     readings, white = experiment.readings, Variances(Noise(0.05))
     start = {"C1_MPa": C1} | {p.name: 0.0 for p in variant.parameters}

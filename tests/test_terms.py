@@ -20,6 +20,7 @@ from fabric_fenicsx.loop.kinds.picture_frame.terms import terms
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.loop.report.discovered import Discovered, _shortest
 from fabric_fenicsx.loop.report.effect_file import effect_file
+from fabric_fenicsx.mechanics.laws.lagging import Lagging
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw
 from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw, shape_of
 from fabric_fenicsx.rigs.cases import CrossoverKeys
@@ -65,6 +66,8 @@ PATH = [0.1, 0.3, 0.3, 0.2, -0.1, 0.4]
         ("largest_angle", [0.1, 0.3, 0.3, 0.3, 0.3, 0.4]),
         ("relative_angle", [1.0, 1.0, 1.0, 2.0 / 3.0, 1.0 / 3.0, 1.0]),
         ("path", [0.1, 0.3, 0.3, 0.4, 0.7, 1.2]),
+        # A hold goes on as the motion before it.
+        ("since_reversal", [0.1, 0.3, 0.3, 0.1, 0.4, 0.5]),
         ("time", [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]),
         ("rate", [0.2, 0.4, 0.0, 0.2, 0.6, 1.0]),
         # A hold goes on as the motion before it; 0.2 to -0.1 is a way down in size.
@@ -162,22 +165,27 @@ def test_a_flow_at_its_rate_reaches_its_limit():
         assert late == pytest.approx(moment, rel=0.01)
 
 
-@pytest.mark.parametrize("base", ["lagging", "lagging_even"])
-def test_what_lags_is_a_branch_whose_spring_is_not_straight(base):
+LAGGING = {"coefficients": (0.3, 2.0), "reach": 0.5}
+
+
+def rise(angle, even=False):
+    """dg/dγ of that."""
+    x = np.abs(angle) / 0.5
+    return (0.3 + 4.0 * x) / 0.5 * (np.sign(angle) if even else 1.0)
+
+
+@pytest.mark.parametrize(("even", "growth"), [(False, None), (True, None), (False, 0.7)])
+def test_what_lags_is_a_branch_whose_spring_is_not_straight(even, growth):
     """On a ramp from −0.2 to 0.4 rad, against an integration of dM/dt = dg/dt − M/τ."""
-    law = ShapedLaw(base, "angle", reach=0.5, coefficients=(0.3, 2.0), memory=4.0)
+    law = Lagging(**LAGGING, even=even, memory=4.0, growth=growth)
     step, rate = 0.1, 0.06
     t = step * np.arange(1, 101)
     gamma = np.concatenate([[-0.2], -0.2 + rate * t])
     (before, *moments), _ = marched(law, gamma, step=step)
-
-    def slope(angle):
-        x = abs(angle) / 0.5
-        rise = (0.3 + 4.0 * x) / 0.5
-        return rise if base == "lagging" else rise * np.sign(angle)
-
+    # The first step is over before the ramp begins.
+    age = 4.0 + (growth or 0.0) * step
     exact = solve_ivp(
-        lambda t, m: slope(-0.2 + rate * t) * rate - m / 4.0,
+        lambda t, m: rise(-0.2 + rate * t, even) * rate - m / (age + (growth or 0.0) * t),
         (0.0, t[-1]),
         [before],
         t_eval=t,
@@ -186,6 +194,46 @@ def test_what_lags_is_a_branch_whose_spring_is_not_straight(base):
         max_step=0.05,
     ).y[0]
     assert np.abs(moments - exact).max() < 2e-3 * np.abs(exact).max()
+
+
+def test_a_play_is_taken_up_before_a_moment_follows():
+    """Out, back through the play of 0.1 rad and beyond it: g(p) with p behind γ."""
+    law = Lagging(**LAGGING, play=0.1)
+    gamma = np.array([0.05, 0.1, 0.3, 0.2, 0.1, 0.0, -0.2, -0.4])
+    followed = np.array([0.0, 0.0, 0.2, 0.2, 0.2, 0.1, -0.1, -0.3])
+    x = np.abs(followed) / 0.5
+    expected = (0.3 * x + 2.0 * x**2) * np.sign(followed)
+    assert marched(law, gamma)[0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_cord_does_not_push():
+    """Pulled and held it relaxes; on the way back, where a branch would push, there is nothing."""
+    gamma = np.concatenate([np.linspace(0.0, 0.3, 7), np.full(20, 0.3), np.linspace(0.3, -0.1, 9)])
+    branch, cord = (
+        marched(Lagging((1.0,), 0.5, memory=2.0, pulls=side), gamma)[0] for side in (0, 1)
+    )
+    assert cord[:27] == pytest.approx(branch[:27], abs=1e-14)
+    assert branch[-1] < -0.1 and cord[-1] == 0.0
+    other, _ = marched(Lagging((1.0,), 0.5, memory=2.0, pulls=-1), -gamma)
+    assert other == pytest.approx(-cord, abs=1e-14)
+
+
+def test_what_goes_by_the_rate_may_come_late():
+    """At a rate of 0.2 it is on its way to g of that, and fades where nothing moves."""
+    law = Lagging((0.3, 2.0), 0.5, memory=2.0, by="rate")
+    gamma = np.concatenate([STEP * 0.2 * np.arange(1, 9), np.full(6, STEP * 0.2 * 8)])
+    found = marched(law, gamma)[0]
+    there = 0.3 * 0.4 + 2.0 * 0.4**2
+    t = STEP * np.arange(1, 15)
+    rising = there * (1.0 - np.exp(-t / 2.0))
+    fading = rising[7] * np.exp(-(t - t[7]) / 2.0)
+    assert found == pytest.approx(np.where(t <= t[7], rising, fading), rel=1e-9)
+
+
+@pytest.mark.parametrize("numbers", [{"growth": 0.5}, {"by": "rate"}])
+def test_what_never_forgets_is_neither_old_nor_late(numbers):
+    with pytest.raises(ValueError, match="memory"):
+        Lagging(**LAGGING, **numbers)
 
 
 def test_a_flow_decays_in_a_hold_as_its_power_says():

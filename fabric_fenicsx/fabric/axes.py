@@ -35,18 +35,24 @@ class TowAxes:
     """The slopes as weighted sums of places of nodes.
 
     Attributes:
-        net: the net.
+        points: undeformed places of the nodes [mm], (n_nodes, 3).
         nodes: whose places, for the warp and the weft of each crossing, (n_crossings, 2, m), with m
             = 2 reach + 1.
         weights: of their coordinates [1/mm], (n_crossings, 2, m, 3).
     """
 
-    net: Net
+    points: Floats
     nodes: Integers
     weights: Floats
 
     @classmethod
-    def of(cls, net: Net, symmetry: Sequence[int] = (), reach: int = REACH) -> TowAxes:
+    def of(
+        cls,
+        net: Net,
+        symmetry: Sequence[int] = (),
+        reach: int = REACH,
+        crossings: Integers | None = None,
+    ) -> TowAxes:
         """Those of a net.
 
         Near a free end of a tow fewer places count, the tow's end among them. In a plane of
@@ -56,28 +62,43 @@ class TowAxes:
             net: the net.
             symmetry: axes whose planes through the origin mirror the net: 0 for x = 0, 1 for y = 0.
             reach: places to either side of a crossing; with 1 of second order in the spacing.
+            crossings: numbers of those that are asked for, (n,); by default all.
         """
         count, size = len(net.crossings), 2 * reach + 1
         nodes = np.zeros((count, 2, size), dtype=np.int64)
         weights = np.zeros((count, 2, size, 3))
         tow = node_tows(net)
+        asked = np.zeros(count, dtype=bool)
+        asked[slice(None) if crossings is None else crossings] = True
         for side in (0, 1):
             for own in crossings_by_tow(net, side):
+                if not asked[own].any():
+                    continue
                 line = net.crossings[own, side]
                 ends = net.ends[tow[line[0]]]
                 nodes[own, side], weights[own, side] = _on_tow(net, line, ends, symmetry, reach)
-        return cls(net, nodes, weights)
+        if crossings is not None:
+            nodes, weights = nodes[crossings], weights[crossings]
+        return cls(net.points, nodes, weights)
+
+    def at_nodes(self, nodes: Integers) -> TowAxes:
+        """The same from the places of some nodes only.
+
+        Args:
+            nodes: their numbers, increasing, those of ``nodes`` among them.
+        """
+        return TowAxes(self.points[nodes], np.searchsorted(nodes, self.nodes), self.weights)
 
     def at(self, displacement: Floats) -> Floats:
         """Unit tangents of warp and weft at each crossing, along the tows' senses.
 
         Args:
-            displacement: of the net's nodes [mm], (n_nodes, 3).
+            displacement: of the nodes [mm], (n_nodes, 3).
 
         Returns:
             Of warp and of weft, shape (n_crossings, 2, 3).
         """
-        places = self.net.points + displacement
+        places = self.points + displacement
         slopes = (self.weights * places[self.nodes]).sum(axis=2)
         return slopes / np.linalg.norm(slopes, axis=-1, keepdims=True)
 

@@ -99,14 +99,29 @@ def variants(annotation: Any) -> dict[str, type[BaseModel]]:
     """The groups that the value of a key tells apart, by that value; also of a list's entries."""
     if get_origin(annotation) is list or get_origin(annotation) is Annotated:
         return variants(get_args(annotation)[0])
-    found: dict[str, type[BaseModel]] = {}
-    if get_origin(annotation) in (Union, types.UnionType):
-        for part in get_args(annotation):
-            if isinstance(part, type) and issubclass(part, BaseModel):
-                kinds = (field.annotation for field in part.model_fields.values())
-                tags = (get_args(kind) for kind in kinds if get_origin(kind) is Literal)
-                found |= {tag: part for several in tags for tag in several}
-    return found
+    if get_origin(annotation) not in (Union, types.UnionType):
+        return {}
+    groups = [
+        part
+        for part in get_args(annotation)
+        if isinstance(part, type) and issubclass(part, BaseModel)
+    ]
+    literals = [
+        {
+            name: get_args(field.annotation)
+            for name, field in group.model_fields.items()
+            if get_origin(field.annotation) is Literal
+        }
+        for group in groups
+    ]
+    # A key that one of them has by itself tells nothing.
+    shared = set(literals[0]).intersection(*literals) if literals else set()
+    return {
+        tag: group
+        for group, own in zip(groups, literals, strict=True)
+        for name in shared
+        for tag in own[name]
+    }
 
 
 def allowed_by(field: FieldInfo) -> str:

@@ -1,8 +1,9 @@
 """What a run leaves on disk: every accepted step, a table of steps, a ParaView series, a result.
 
-A step file holds the accepted state in the order of the net's nodes, so that a run can go on from
-it on any number of ranks, and what is seen of it (output.results). Files are written beside their
-place and then moved there: a run that dies leaves whole files only.
+A step file holds the accepted state by the net's numbers of nodes, cells and crossings, so that a
+run can go on from it on any number of ranks, and what is seen of it (output.results). Each rank
+writes what it owns. Files are written beside their place and then moved there: a run that dies
+leaves whole files only.
 """
 
 from __future__ import annotations
@@ -10,26 +11,32 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
+from mpi4py import MPI
+
 import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
 from ..fabric.net import Net
-from ..parallel import from_root, neighbour
+from ..fabric.part import Where
+from ..parallel import from_root
 from ..solving.balance import Balance
 from ..solving.model import Model
 from ..solving.predictor import DEPTH
+from ..solving.seen import PLACES
 from ..solving.snapshot import Snapshot
 from ..solving.stepping import Step, Stepper
-from .files import append_text, write_npz, write_text
+from .files import append_text, write_text
 from .paraview import TimeSeries
 from .results import read_net, seen_arrays, write_setup
+from .steps import StepFile, remove_step, remove_torn, step_path, write_step
 from .surfaces import tool_surface
 
 __all__ = ["Record", "load_state", "write_result"]
@@ -42,6 +49,9 @@ STEP_SCHEMA = "fabric-step/4"
 STATE = {"u": 3, "q": 4, "v": 6, "vdot": 6, "a": 6, "previous": 6 * DEPTH}
 """What a step file has for each node, and how many numbers of it."""
 
+HISTORY = "history: "
+"""Before the names of histories in a step file."""
+
 NUMBERS = ("time", "number", "previous_steps", "predictor_order", "last_step", "next_step")
 """What it has beside."""
 
@@ -53,7 +63,7 @@ RECENT = 200
 class Record:
     """Writes steps as they are accepted. Every method is collective.
 
-    Rank 0 writes what is seen of them, its ``neighbour`` the step files.
+    Each rank writes its own part of a step, rank 0 the tables beside.
 
     What is held does not grow with the number of steps.
 
@@ -67,7 +77,11 @@ class Record:
 
     Attributes:
         recent: the last rows of `steps.csv`, on every rank.
-        gaps: distance of each node from each tool at the last step [mm], (n_nodes,).
+        gaps: distance of this rank's own nodes from each tool at the last step [mm], (n_owned,
+            n_tools).
+
+    Raises:
+        InputError: a rank cannot see the folder.
     """
 
     def __init__(
@@ -79,40 +93,55 @@ class Record:
         case_text: str | None = None,
         quarter: bool = False,
     ) -> None:
-        self.folder, self.model = folder, model
+        self.model = model
         self.recent: deque[dict[str, float]] = deque(maxlen=RECENT)
-        self.gaps: dict[str, npt.NDArray[np.float64]] = {}
+        self.gaps = np.zeros((model.disc.owned, 0))
         # Rank 0's, whatever folder a script has named on the others.
-        self.steps = model.comm.bcast((folder / "steps").absolute())
-        self._table = folder / "steps.csv"
-        self._root, self._keeper = model.comm.rank == 0, neighbour(model.comm)
+        self.folder = model.comm.bcast(folder.absolute())
+        self.steps = self.folder / "steps"
+        self._table = self.folder / "steps.csv"
+        self._root = model.comm.rank == 0
         self._columns: list[str] = []
         # The step that was looked at last, and where the tools are in it.
         self._seen: tuple[Snapshot, dict[str, npt.NDArray[np.float64]]]
+        until = math.inf if resume_at is None else resume_at * (1.0 + 1e-12)
         if self._root:
-            self._open(resume_at)
+            self._open(None if resume_at is None else until)
             (folder / "case.yaml").unlink(missing_ok=True)
             if case_text is not None:
                 write_text(folder / "case.yaml", case_text)
-        self.recent = model.comm.bcast(self.recent)
+        comm = model.comm
+        self.recent = comm.bcast(self.recent)
+        if not all(comm.allgather(self.steps.is_dir())):
+            raise InputError(f"{self.folder}: seen by some ranks only, allowed is a shared folder")
+        self._series = TimeSeries(
+            self.folder / "paraview",
+            model.disc.part,
+            resume=resume_at is not None,
+            until=until,
+            rank=comm.rank,
+            ranks=comm.size,
+            crossings=len(model.net.crossings) > 0,
+            wait=comm.barrier,
+        )
+        self._series.last = comm.bcast(self._series.last)
         past = self.recent[-1] if self.recent else None
         self._balance = Balance(model, past, quarter=quarter)
 
-    def _open(self, resume_at: float | None) -> None:
-        """Start the series and the table, or cut both at the time to go on from."""
+    def _open(self, until: float | None) -> None:
+        """Start the steps and the table, or cut the table at the time to go on from."""
         folder, net = self.folder, self.model.net
         self.steps.mkdir(exist_ok=True)
         extent = PLATE_EXTENT * float(np.abs(net.points[:, :2]).max())
         write_setup(folder, net, [tool_surface(t, extent, np.zeros(3)) for t in self.model.tools])
-        if resume_at is None:
-            for old in [*self.steps.glob("step_*.npz"), self._table, folder / "result.json"]:
+        if until is None:
+            for step in self.steps.glob("step_*.npz"):
+                remove_step(step)
+            for old in (self._table, folder / "result.json"):
                 old.unlink(missing_ok=True)
-            self._series = TimeSeries(folder / "paraview", net)
+        remove_torn(self.steps)
+        if until is None:
             return
-        until = resume_at * (1.0 + 1e-12)
-        self._series = TimeSeries(folder / "paraview", net, resume=True, until=until)
-        for torn in self.steps.glob("*.partial.npz"):
-            torn.unlink()
         self._columns, rows = _read_table(self._table)
         rows = [row for row in rows if row["time_s"] <= until]
         self.recent.extend(rows)
@@ -128,11 +157,25 @@ class Record:
         )
         return rows
 
-    def observe(self, step: Step, measure: Callable[[Snapshot], dict[str, float]]) -> Snapshot:
-        """Look at a converged step, and write its row: energies, tool forces."""
+    def observe(
+        self,
+        step: Step,
+        measure: Callable[[Snapshot], dict[str, float]] | None = None,
+        measure_own: Callable[[Snapshot], dict[str, float]] | None = None,
+    ) -> Snapshot:
+        """Look at a converged step, and write its row: energies, tool forces.
+
+        Args:
+            step: the step.
+            measure: further columns from the snapshot of the whole net, which is gathered for it.
+            measure_own: further columns from that of this rank's part, the same on every rank.
+
+        Returns:
+            The snapshot of this rank's part.
+        """
         model = self.model
         outside = model.outside()
-        snapshot = model.snapshot(step.time, outside)
+        snapshot = model.own_snapshot(step.time, outside)
         row: dict[str, float] = {
             "step": step.number,
             "time_s": step.time,
@@ -141,10 +184,16 @@ class Record:
             "failed_attempts": step.failures,
         }
         row |= self._balance.step(step, outside)
-        self.gaps = model.gaps()
-        for tool, gap in self.gaps.items():
-            row[f"{tool}_penetration_mm"] = max(0.0, -float(gap.min()))
-        row |= measure(snapshot)
+        if model.contacts is not None:
+            self.gaps = model.contacts.own_gaps()
+            least = self.gaps.min(axis=0, initial=np.inf)
+            model.comm.Allreduce(MPI.IN_PLACE, least, op=MPI.MIN)
+            for tool, gap in zip(model.tools, least, strict=True):
+                row[f"{tool.name}_penetration_mm"] = max(0.0, -float(gap))
+        if measure is not None:
+            row |= measure(model.whole(snapshot))
+        if measure_own is not None:
+            row |= measure_own(snapshot)
         self.recent.append(row)
         self._seen = snapshot, {tool.name: model.tool_place(tool.name) for tool in model.tools}
         if self._root:
@@ -156,14 +205,10 @@ class Record:
         return snapshot
 
     def keep(self, step: Step, stepper: Stepper) -> None:
-        """Write the accepted state, and what `observe` has seen of it in there and for ParaView.
-
-        ParaView's files are rank 0's and the state is its neighbour's, at the same time.
-        """
+        """Write the accepted state, and what `observe` has seen of it in there and for ParaView."""
         model, state, predictor = self.model, stepper.state, stepper.predictor
-        disc = model.disc
-        n = disc.owned
-        arrays = {
+        disc, (snapshot, places) = model.disc, self._seen
+        state_arrays = {
             "u": disc.tows.u_n.x.array.reshape(-1, 3),
             "q": disc.tows.q_n.x.array.reshape(-1, 4),
             "v": state.v,
@@ -171,28 +216,36 @@ class Record:
             "a": state.a,
             "previous": np.hstack(list(predictor.past)),
         }
-        together = np.hstack([values[:n] for values in arrays.values()])
-        whole = disc.gather_nodes(together, to=self._keeper)
-        histories = model.histories.save(to=self._keeper)
-        if self._root:
-            self._series.add(*self._seen)
-        if model.comm.rank == self._keeper:
-            scalars = {
-                "schema": STEP_SCHEMA,
-                "time": step.time,
-                "number": step.number,
-                "previous_steps": predictor.lengths,
-                "predictor_order": predictor.order,
-                "last_step": state.last_step,
-                "next_step": state.next_step,
-            }
-            parts = np.hsplit(whole, np.cumsum([STATE[name] for name in arrays])[:-1])
-            written = {name: np.asarray(value) for name, value in scalars.items()}
-            written |= dict(zip(arrays, parts, strict=True))
-            written |= seen_arrays(*self._seen)
-            written |= {f"history: {name}": values for name, values in histories.items()}
-            path = self.steps / f"step_{step.number:05d}.npz"
-            write_npz(path, written, compressed=False, durable=True)
+        alike = {
+            "schema": STEP_SCHEMA,
+            "time": step.time,
+            "number": step.number,
+            "previous_steps": predictor.lengths,
+            "predictor_order": predictor.order,
+            "last_step": state.last_step,
+            "next_step": state.next_step,
+        }
+        rows = model.histories.own()
+        rows = {
+            where: {HISTORY + name: a for name, a in own.items()} for where, own in rows.items()
+        }
+        rows["nodes"] |= {name: disc.in_order("nodes", a) for name, a in state_arrays.items()}
+        kept = {name: np.asarray(value) for name, value in alike.items()}
+        kept |= {HISTORY + name: values for name, values in model.histories.numbers.items()}
+        owned = np.searchsorted(disc.part.nodes, np.sort(disc.numbers["nodes"]))
+        for name, values in seen_arrays(snapshot, places).items():
+            where = PLACES.get(name.removeprefix("seen: "))
+            if where is None:
+                kept[name] = values
+            else:
+                rows[where][name] = values[owned] if where == "nodes" else values
+        self._series.add(snapshot, places)
+        numbers: dict[Where, npt.NDArray[np.int64]] = {
+            where: np.sort(own) for where, own in disc.numbers.items()
+        }
+        comm = model.comm
+        path = step_path(self.steps, step.number)
+        write_step(path, kept, rows, numbers, rank=comm.rank, ranks=comm.size, wait=comm.barrier)
 
 
 def _read_table(path: Path) -> tuple[list[str], list[dict[str, float]]]:
@@ -222,56 +275,71 @@ def write_result(folder: Path, result: dict[str, Any]) -> None:
 
 
 def load_state(path: Path, stepper: Stepper) -> None:
-    """Make a step file the accepted state; every rank reads it.
+    """Make a step file the accepted state; every rank reads of it what it owns. Collective.
 
     Raises:
         InputError: it is not a step of this net.
     """
-    disc, state = stepper.net, stepper.state
-    setup = path.parents[1] / "net.npz"
-    if setup.exists() and not _same(read_net(setup), disc.net):
-        raise InputError(f"{path}: a step of another net than that of this case")
+    disc, setup = stepper.net, path.parents[1] / "net.npz"
+
+    def check() -> None:
+        if setup.exists() and not _same(read_net(setup), disc.net):
+            raise InputError(f"{path}: a step of another net than that of this case")
+
+    from_root(disc.comm, check)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            data = {name: file[name] for name in file.files}
-        schema = str(data.get("schema", "fabric-step/1"))  # the first did not say
-        if schema != STEP_SCHEMA:
-            raise ValueError(f"schema {schema}, this version reads {STEP_SCHEMA}")
-        missing = {*STATE, *NUMBERS} - set(data)
-        if missing:
-            raise KeyError(f"{', '.join(sorted(missing))} missing")
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+        with StepFile(path) as file:
+            _load(file, path, stepper)
+    except (OSError, ValueError, KeyError, EOFError, IndexError, BadZipFile) as error:
         line = " ".join(str(error).split()).strip("'")
         raise InputError(f"{path}: not a step file ({line})") from None
-    nodes = len(disc.net.points)
-    for name, width in STATE.items():
-        if data[name].shape != (nodes, width):
-            raise InputError(
-                f"{path}: {name} has shape {data[name].shape}; that of this net is {nodes, width}"
-            )
 
-    def local(name: str) -> npt.NDArray[np.float64]:
-        return data[name][disc.local_nodes]
 
-    disc.tows.u_n.x.array[:] = local("u").ravel()
-    disc.tows.q_n.x.array[:] = local("q").ravel()
+def _load(file: StepFile, path: Path, stepper: Stepper) -> None:
+    disc, state, names = stepper.net, stepper.state, set(file.names)
+    schema = str(file["schema"]) if "schema" in names else "fabric-step/1"  # it did not say
+    if schema != STEP_SCHEMA:
+        raise ValueError(f"schema {schema}, this version reads {STEP_SCHEMA}")
+    missing = {*STATE, *NUMBERS} - names
+    if missing:
+        raise KeyError(f"{', '.join(sorted(missing))} missing")
+    sizes = {"nodes": len(disc.net.points), "cells": len(disc.net.cells)}
+    sizes["crossings"] = len(disc.net.crossings)
+
+    def of_nodes(name: str, nodes: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+        rows, shape = file.rows(name, nodes, sizes["nodes"])
+        wanted = sizes["nodes"], STATE[name]
+        if shape != wanted:
+            raise InputError(f"{path}: {name} has shape {shape}; that of this net is {wanted}")
+        return rows
+
+    def remembered(
+        name: str, where: Where, numbers: npt.NDArray[np.int64]
+    ) -> npt.NDArray[np.float64]:
+        rows, shape = file.rows(HISTORY + name, numbers, sizes[where])
+        if shape[0] != sizes[where]:
+            raise IndexError
+        return rows
+
+    state_of = {name: of_nodes(name, disc.local_nodes) for name in STATE}
+    disc.tows.u_n.x.array[:] = state_of["u"].ravel()
+    disc.tows.q_n.x.array[:] = state_of["q"].ravel()
     if disc.connectors is not None:
-        disc.connectors.u_n.x.array[:] = data["u"][disc.connector_nodes].ravel()
-        disc.connectors.q_n.x.array[:] = data["q"][disc.connector_nodes].ravel()
-    state.v, state.vdot, state.a = local("v"), local("vdot"), local("a")
-    stepper.predictor.past = np.stack(np.hsplit(local("previous"), DEPTH))
-    stepper.predictor.lengths = data["previous_steps"]
-    stepper.predictor.order = int(data["predictor_order"])
-    state.time = float(data["time"])
-    state.last_step = float(data["last_step"])
-    state.next_step = float(data["next_step"])
-    stepper.number = int(data["number"])
-    prefix = "history: "
-    saved = {k.removeprefix(prefix): v for k, v in data.items() if k.startswith(prefix)}
+        disc.connectors.u_n.x.array[:] = of_nodes("u", disc.connector_nodes).ravel()
+        disc.connectors.q_n.x.array[:] = of_nodes("q", disc.connector_nodes).ravel()
+    state.v, state.vdot, state.a = (state_of[name] for name in ("v", "vdot", "a"))
+    stepper.predictor.past = np.stack(np.hsplit(state_of["previous"], DEPTH))
+    stepper.predictor.lengths = file["previous_steps"]
+    stepper.predictor.order = int(file["predictor_order"])
+    state.time = float(file["time"])
+    state.last_step = float(file["last_step"])
+    state.next_step = float(file["next_step"])
+    stepper.number = int(file["number"])
+    lost = [name for name in stepper.model.histories.names if HISTORY + name not in names]
+    if lost:
+        raise InputError(f"{path}: has no history '{lost[0]}', which this case needs")
     try:
-        stepper.model.histories.load(saved)
-    except KeyError as error:
-        raise InputError(f"{path}: has no history {error}, which this case needs") from None
+        stepper.model.histories.read(lambda name: file[HISTORY + name], remembered)
     except (ValueError, IndexError):
         raise InputError(f"{path}: a history has not the shape that this net needs") from None
     stepper.model.stand(state.time)

@@ -17,6 +17,7 @@ from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import write_bytes, write_npz
 from fabric_fenicsx.output.mirror import whole_sheet
+from fabric_fenicsx.output.steps import StepFile, step_path
 from fabric_fenicsx.output.surfaces import (
     OTHER_COLOUR,
     TOOL_COLOURS,
@@ -201,12 +202,12 @@ def seen_arrays(
 def _read_step(path: Path, net: Net) -> tuple[Snapshot, dict[str, npt.NDArray[np.float64]]]:
     """A step's snapshot and where each tool was [mm], by name."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with StepFile(path) as file:
             seen = {name: file[f"seen: {name}"] for name in SEEN}
             snapshot = Snapshot(time=float(file["time"]), displacement=file["u"], **seen)
             snapshot.check(net)
             prefix = "place: "
-            names = [name for name in file.files if name.startswith(prefix)]
+            names = [name for name in file.names if name.startswith(prefix)]
             return snapshot, {name.removeprefix(prefix): file[name] for name in names}
     except Exception as error:  # a broken archive raises whatever it likes
         raise _no_step(path, error) from None
@@ -214,7 +215,7 @@ def _read_step(path: Path, net: Net) -> tuple[Snapshot, dict[str, npt.NDArray[np
 
 def _time_of(path: Path) -> float:
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with StepFile(path) as file:
             return float(file["time"])
     except Exception as error:
         raise _no_step(path, error) from None
@@ -225,7 +226,7 @@ def _no_step(path: Path, error: Exception) -> InputError:
 
 
 def _step_file(folder: Path, number: int) -> Path:
-    return folder / "steps" / f"step_{number:05d}.npz"
+    return step_path(folder / "steps", number)
 
 
 def _tool(path: Path) -> TriangleSurface:

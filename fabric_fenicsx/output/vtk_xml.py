@@ -18,9 +18,11 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Packed", "packed", "xml_file"]
+__all__ = ["Packed", "packed", "parallel_file", "xml_file"]
 
 TYPES = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
+
+ORDER = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
 
 Sections = Mapping[str, Mapping[str, "Packed"]]
 
@@ -76,10 +78,9 @@ def xml_file(
     arrays = [*field.values(), *(array for own in sections.values() for array in own.values())]
     ends = np.cumsum([len(array.data) for array in arrays]).tolist()
     offsets = iter([0, *ends])
-    order = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
     lines = [
         '<?xml version="1.0"?>',
-        f'<VTKFile type="{kind}" version="1.0" byte_order="{order}" header_type="UInt64" '
+        f'<VTKFile type="{kind}" version="1.0" byte_order="{ORDER}" header_type="UInt64" '
         'compressor="vtkZLibDataCompressor">',
         f"<{kind}>",
         *_section("FieldData", field, offsets),
@@ -93,18 +94,45 @@ def xml_file(
     return [("\n".join(lines) + "\n_").encode(), *(array.data for array in arrays), end]
 
 
+def parallel_file(kind: str, sections: Sections, sources: Sequence[str]) -> str:
+    """A file that names the pieces of which a whole is made, and what is in them.
+
+    Args:
+        kind: of the pieces, as for ``xml_file``.
+        sections: of any of the pieces; points, and data of points and cells, are named.
+        sources: files of the pieces, from the folder of this one.
+    """
+    lines = [
+        '<?xml version="1.0"?>',
+        f'<VTKFile type="P{kind}" version="1.0" byte_order="{ORDER}" header_type="UInt64" '
+        'compressor="vtkZLibDataCompressor">',
+        f'<P{kind} GhostLevel="0">',
+    ]
+    for name in ("PointData", "CellData", "Points"):
+        own = sections.get(name, {})
+        arrays = [f"<PDataArray {_described(title, a)}/>" for title, a in own.items()]
+        lines += [f"<P{name}>", *arrays, f"</P{name}>"]
+    pieces = [f"<Piece Source={quoteattr(source)}/>" for source in sources]
+    return "\n".join([*lines, *pieces, f"</P{kind}>", "</VTKFile>", ""])
+
+
+def _described(title: str, array: Packed) -> str:
+    """Attributes of an array that say what it has."""
+    components = f' NumberOfComponents="{array.components}"' if array.components > 1 else ""
+    named = "".join(
+        f" ComponentName{i}={quoteattr(component)}" for i, component in enumerate(array.names)
+    )
+    return f'type="{array.kind}" Name={quoteattr(title)}{components}{named}'
+
+
 def _section(name: str, arrays: Mapping[str, Packed], offsets: Iterator[int]) -> Iterator[str]:
     if not arrays and name == "FieldData":
         return
     yield f"<{name}>"
     for title, array in arrays.items():
         tuples = f' NumberOfTuples="{array.rows}"' if name == "FieldData" else ""
-        components = f' NumberOfComponents="{array.components}"' if array.components > 1 else ""
-        named = "".join(
-            f" ComponentName{i}={quoteattr(component)}" for i, component in enumerate(array.names)
-        )
         yield (
-            f'<DataArray type="{array.kind}" Name={quoteattr(title)}{components}{named}{tuples} '
+            f"<DataArray {_described(title, array)}{tuples} "
             f'format="appended" offset="{next(offsets)}"/>'
         )
     yield f"</{name}>"

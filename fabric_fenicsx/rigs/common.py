@@ -221,7 +221,8 @@ def simulated(
     end: float,
     control: StepControl,
     stops: Sequence[float] = (),
-    measure: Callable[[Snapshot], dict[str, float]] = lambda snapshot: {},
+    measure: Callable[[Snapshot], dict[str, float]] | None = None,
+    measure_own: Callable[[Snapshot], dict[str, float]] | None = None,
 ) -> Run:
     """Run the model of a case to its end, or as far as it goes. Collective.
 
@@ -232,7 +233,8 @@ def simulated(
         end: final time [s].
         control: step lengths.
         stops: times that steps must not jump over [s].
-        measure: further columns for each step's row, from its snapshot.
+        measure: further columns for each step's row, from the snapshot of the whole net.
+        measure_own: see ``simulate``.
 
     Raises:
         InputError: there is nothing to resume.
@@ -247,6 +249,7 @@ def simulated(
         force_tolerance=case.solver.force_tolerance_N,
         iteration_limit=case.solver.iteration_limit,
         measure=measure,
+        measure_own=measure_own,
         progress=lambda time, step, its: session.progress(time / end, step, its),
         resume=session.resume,
         case_text=session.case_text,

@@ -32,6 +32,7 @@ from ..output.files import write_text
 from ..output.folder import prepare_folder
 from ..output.record import write_result
 from ..output.results import read_results
+from ..output.steps import remove_step
 from ..parallel import from_root
 from ..solving.snapshot import Snapshot
 from .cases import Case
@@ -161,7 +162,7 @@ def _run(
     )
     if comm.rank == 0:
         for step in sorted((folder / "steps").glob("step_*.npz"))[:-1]:
-            step.unlink()
+            remove_step(step)
         shutil.rmtree(folder / "paraview", ignore_errors=True)
     return result
 

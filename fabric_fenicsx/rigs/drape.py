@@ -344,9 +344,10 @@ def run(case: DrapeCase, session: Session) -> dict[str, Any]:
 
     model = build(case, session)
 
-    def measure(snapshot: Snapshot) -> dict[str, float]:
+    def measure_own(snapshot: Snapshot) -> dict[str, float]:
+        largest = float(np.abs(snapshot.shear_angle).max(initial=0.0))
         return {
-            "largest_shear_deg": float(np.degrees(np.abs(snapshot.shear_angle).max())),
+            "largest_shear_deg": float(np.degrees(max(session.comm.allgather(largest)))),
             "holder_height_mm": float(model.tool_place("holder")[2]),
         }
 
@@ -356,7 +357,7 @@ def run(case: DrapeCase, session: Session) -> dict[str, Any]:
         session,
         end=case.duration_s,
         control=control(case.solver, case.edge_radius_mm / 2.0),
-        measure=measure,
+        measure_own=measure_own,
     )
     return report(case, session, model, outcome)
 

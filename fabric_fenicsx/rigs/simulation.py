@@ -56,7 +56,8 @@ def simulate(
     stops: Sequence[float] = (),
     force_tolerance: float = 1e-4,
     iteration_limit: int = 20,
-    measure: Callable[[Snapshot], dict[str, float]] = lambda snapshot: {},
+    measure: Callable[[Snapshot], dict[str, float]] | None = None,
+    measure_own: Callable[[Snapshot], dict[str, float]] | None = None,
     progress: Callable[[float, int, int], None] = lambda time, step, iterations: None,
     resume: bool = False,
     case_text: str | None = None,
@@ -74,7 +75,9 @@ def simulate(
         stops: times that steps must not jump over (where a prescribed motion has a corner) [s].
         force_tolerance: residual norm at which a step is in balance [N, N mm].
         iteration_limit: Newton iterations after which a step has failed.
-        measure: further columns for each step's row, from its snapshot.
+        measure: further columns for each step's row, from the snapshot of the whole net.
+        measure_own: the same from that of each rank's part, which no message has to gather; what it
+            returns is the same on every rank.
         progress: told the time reached, the step and its iterations.
         resume: go on from the last step file in the folder.
         case_text: the case as YAML, to be kept beside the records.
@@ -105,7 +108,7 @@ def simulate(
     last: list[Snapshot] = []
 
     def observe(step: Step) -> None:
-        last[:] = [record.observe(step, measure)]
+        last[:] = [record.observe(step, measure, measure_own)]
         progress(step.time, step.number, step.iterations)
 
     stepper.observe = observe
@@ -151,4 +154,7 @@ def simulate(
         "dofs": int(model.net.points.shape[0] * 6),
         "seconds": {key: round(value, 3) for key, value in seconds.items()},
     }
-    return Run(stop is None, stop, record.rows(), last[0] if last else None, record.gaps, summary)
+    whole = model.whole(last[0]) if last else None
+    gaps = model.disc.gather_nodes(record.gaps).T if last and model.tools else ()
+    by_tool = {tool.name: gap for tool, gap in zip(model.tools, gaps, strict=False)}
+    return Run(stop is None, stop, record.rows(), whole, by_tool, summary)

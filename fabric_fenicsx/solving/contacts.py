@@ -195,10 +195,10 @@ class Contacts:
 
         Collective; (n_nodes,) each, on every rank.
         """
-        whole = self._disc.gather_nodes(self._own_gaps())
+        whole = self._disc.gather_nodes(self.own_gaps())
         return dict(zip((tool.name for tool in self.tools), whole.T, strict=True))
 
-    def _own_gaps(self) -> Array:
+    def own_gaps(self) -> Array:
         """Distance of this rank's own nodes from each tool [mm], (n_owned, n_tools)."""
         disc = self._disc
         return disc.node_values(self._gaps, len(self.tools))[: disc.owned]
@@ -212,7 +212,7 @@ class Contacts:
             Into which tools and by how much, in words; empty where none did.
         """
         limit = contact.LIMIT * self._layer
-        least = self._own_gaps().min(axis=0, initial=np.inf)
+        least = self.own_gaps().min(axis=0, initial=np.inf)
         self._disc.comm.Allreduce(MPI.IN_PLACE, least, op=MPI.MIN)
         deep = {t.name: -gap for t, gap in zip(self.tools, least, strict=True) if gap < -limit}
         for name in deep:

@@ -22,8 +22,10 @@ from .. import _dolfinx
 from .._dolfinx import Function
 from ..fabric.crossings import reference_angle
 from ..fabric.net import Net
+from ..fabric.part import Part, Where
 from ..mechanics.fields import ConnectorFields, TowFields
 from .blocks import BLOCK, block_matrix, expand
+from .exchange import Gather
 from .partition import partition
 from .update import advance
 
@@ -83,7 +85,7 @@ class Discretisation:
         whole = np.ones(len(net.crossings))
         self.interlacing = whole if interlacing is None else interlacing
         self.patch = whole if patch is None else patch
-        self._numbers: dict[str, tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = {}
+        self._gathers: dict[Where, Gather] = {}
         owners = partition(net, comm.size) if comm.rank == 0 else None
         mesh = _dolfinx.interval_mesh(comm, net.points, net.cells, owners)
         space = _dolfinx.lagrange(mesh, BLOCK)
@@ -358,7 +360,7 @@ class Discretisation:
             local: of this rank, (n_owned, size).
             to: the rank that gets them; the others get nothing, (0, size). None: every rank.
         """
-        return self._gather("nodes", self.local_nodes[: self.owned], local, to)
+        return self._gather("nodes", local, to)
 
     def gather_cells(self, local: Array, *, to: int | None = None) -> Array:
         """Rows per owned cell of every rank, in the order of the net's cells. Collective.
@@ -367,8 +369,7 @@ class Discretisation:
             local: of this rank, (n_owned_cells, size); rows of ghosts may follow.
             to: see ``gather_nodes``.
         """
-        count = len(self.owned_cells)
-        return self._gather("cells", self.owned_cells, local[:count], to)
+        return self._gather("cells", local[: len(self.owned_cells)], to)
 
     def gather_crossings(self, local: Array, *, to: int | None = None) -> Array:
         """Rows per crossing of every rank, in the order of the net's crossings. Collective.
@@ -377,29 +378,37 @@ class Discretisation:
             local: of this rank, (n_local_crossings, size).
             to: see ``gather_nodes``.
         """
-        return self._gather("crossings", self.local_crossings, local, to)
+        return self._gather("crossings", local, to)
 
-    def _gather(self, kind: str, own: Any, local: Array, to: int | None) -> Array:
-        comm = self.comm
-        if kind not in self._numbers:
-            # Which rows of the whole each rank has, told once.
-            parts = comm.allgather(own)
-            self._numbers[kind] = np.concatenate(parts), np.array([len(part) for part in parts])
-        numbers, counts = self._numbers[kind]
-        here = to is None or comm.rank == to
-        sent = np.ascontiguousarray(local, dtype=np.float64)
-        if comm.size == 1:
-            rows = sent
-        else:
-            rows = np.zeros((len(numbers) if here else 0, local.shape[1]))
-            if to is None:
-                comm.Allgatherv(sent, (rows, counts * local.shape[1]))
-            else:
-                comm.Gatherv(sent, (rows, counts * local.shape[1]) if here else None, root=to)
-        whole = np.zeros_like(rows)
-        if here:
-            whole[numbers] = rows
-        return whole
+    def _gather(self, where: Where, local: Array, to: int | None) -> Array:
+        if where not in self._gathers:
+            self._gathers[where] = Gather(self.comm, self.numbers[where])
+        return self._gathers[where](local, to=to)
+
+    @property
+    def numbers(self) -> dict[Where, npt.NDArray[np.int64]]:
+        """Net's numbers of the nodes, cells and crossings that this rank owns."""
+        return {
+            "nodes": self.local_nodes[: self.owned],
+            "cells": self.owned_cells,
+            "crossings": self.local_crossings,
+        }
+
+    def in_order(self, where: Where, local: Array) -> Array:
+        """Rows of this rank's own nodes, cells or crossings in the order of the net.
+
+        Args:
+            where: what the rows belong to.
+            local: in the order of ``numbers``; rows of ghosts may follow.
+        """
+        rows: Array = local[np.argsort(self.numbers[where])]
+        return rows
+
+    @cached_property
+    def part(self) -> Part:
+        """What of the net this rank owns, with the other ends of its cells and crossings."""
+        own = self.numbers
+        return Part.of(self.net, own["cells"], own["crossings"], own["nodes"])
 
     def everywhere(self, update: Callable[[Any], None]) -> None:
         """Apply an update to the fields of the tows and to those of the connectors."""

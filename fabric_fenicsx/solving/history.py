@@ -6,19 +6,20 @@ still in the unknowns. All expressions are evaluated before any field changes.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
+from ..fabric.part import Where
 from ..mechanics import beam, crossover
 from .discretisation import Discretisation
 
 __all__ = ["Histories"]
 
 Array = npt.NDArray[np.float64]
-Where = Literal["cells", "nodes", "crossings"]
 
 
 class Histories:
@@ -95,12 +96,25 @@ class Histories:
         _dolfinx.add_vector(values, form)
         return values.reshape(-1, size)
 
-    def save(self, *, to: int | None = None) -> dict[str, Array]:
-        """The remembered values in the order of the net. Collective.
+    @property
+    def names(self) -> list[str]:
+        """Names of all that is remembered."""
+        return [*self._numbers, *self._entries]
 
-        Args:
-            to: the rank that gets them, those of the others being of no use. None: every rank.
-        """
+    @property
+    def numbers(self) -> dict[str, Array]:
+        """The kept numbers by name."""
+        return dict(self._numbers)
+
+    def own(self) -> dict[Where, dict[str, Array]]:
+        """This rank's own part of the remembered fields, rows in the order of the net."""
+        found: dict[Where, dict[str, Array]] = {"nodes": {}, "cells": {}, "crossings": {}}
+        for name, (where, _, _) in self._entries.items():
+            found[where][name] = self.disc.in_order(where, self._own_values(name))
+        return found
+
+    def save(self) -> dict[str, Array]:
+        """The remembered values in the order of the net, on every rank. Collective."""
         disc = self.disc
         saved = {name: values.copy() for name, values in self._numbers.items()}
         gather = {
@@ -113,7 +127,7 @@ class Histories:
             names = [name for name, entry in self._entries.items() if entry[0] == where]
             if names:
                 own = [self._own_values(name) for name in names]
-                whole = gathered(np.hstack(own), to=to)
+                whole = gathered(np.hstack(own))
                 ends = np.cumsum([values.shape[1] for values in own])[:-1]
                 saved |= dict(zip(names, np.hsplit(whole, ends), strict=True))
         return saved
@@ -130,16 +144,32 @@ class Histories:
 
     def load(self, saved: dict[str, Array]) -> None:
         """Put saved values back; KeyError where one is missing."""
+        self.read(saved.__getitem__, lambda name, where, numbers: saved[name][numbers])
+
+    def read(
+        self,
+        whole: Callable[[str], Array],
+        rows: Callable[[str, Where, npt.NDArray[np.int64]], Array],
+    ) -> None:
+        """Put saved values back, of fields those that this rank needs.
+
+        Args:
+            whole: gives kept numbers by name.
+            rows: gives rows of a field by its name, what they belong to and the net's numbers.
+        """
         disc = self.disc
         for name, numbers in self._numbers.items():
-            numbers[:] = saved[name]
+            numbers[:] = whole(name)
         for name, (where, field, _) in self._entries.items():
-            values = saved[name]
             if field is None:
                 continue
+            size = field.function_space.dofmap.index_map_bs
+            values = field.x.array.reshape(-1, size)
             if where == "nodes":
-                field.x.array[:] = values[disc.local_nodes].ravel()
-            elif where == "cells":
-                field.x.array[:] = disc.cell_field(field.function_space, values).x.array
-            else:
-                field.x.array[:] = disc.crossing_field(field.function_space, values).x.array
+                values[:] = rows(name, where, disc.local_nodes)
+                continue
+            own = disc.local_cells
+            if where == "crossings":
+                own = disc.local_crossings[disc.connector_order]
+            dofs = _dolfinx.cell_dofs(field.function_space)[:, 0]
+            values[dofs] = rows(name, where, own).reshape(len(own), size)

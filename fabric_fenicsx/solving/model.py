@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 from mpi4py import MPI
@@ -14,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
-from ..fabric.axes import TowAxes, axes_shear
 from ..fabric.net import Net
 from ..fabric.section import Section
 from ..mechanics import beam, inertia
@@ -30,9 +28,9 @@ from .history import Histories
 from .newton import Newton
 from .parts import Crossings, CrossoverLaw
 from .sections import STRAIGHT, Bending, SectionLawName, diagonals, elastic_section
+from .seen import Seen
 from .snapshot import Snapshot
 from .system import System
-from .update import rotate
 
 __all__ = ["Model", "Support"]
 
@@ -132,8 +130,6 @@ class Model:
         self.net, self.comm = net, comm
         self.time = 0.0
         self._supports = list(supports)
-        self._axes = TowAxes.of(net, symmetry)
-        self._reference_shear = axes_shear(self._axes.at(np.zeros_like(net.points)))
         self.disc = Discretisation(net, stiffness, mass, comm, interlacing, patch)
         self.fields = self.disc.tows
         self.alpha, self.viscosity, self.tools = inertia, viscosity, list(tools)
@@ -170,6 +166,7 @@ class Model:
         if self.contacts is not None:
             self.system.refresh.append(self.contacts.refresh)
             self.contacts.refresh()
+        self._seen = Seen(self, symmetry)
         self._number(supports)
 
     def _constants(self, mass_scale: float) -> None:
@@ -401,34 +398,12 @@ class Model:
 
         To be called after a step converged and before it becomes the accepted state.
         """
-        disc, net = self.disc, self.net
-        outside = self.outside() if outside is None else outside
-        u, q = self.disc.current()
-        pressure = np.zeros((disc.owned, 1))
-        for tool in self.tools:
-            pressure[:, 0] += np.linalg.norm(outside[tool.name][:, :3], axis=1)
-        nodal = disc.gather_nodes(np.hstack([u[: disc.owned], q[: disc.owned], pressure]))
-        displacement, q_nodes = nodal[:, :3], nodal[:, 3:7]
-        directors = np.stack(
-            [rotate(q_nodes, reference) for reference in self._reference_directors], axis=1
-        )
-        forces = disc.gather_cells(self.system.section_forces())
-        axes = self._axes.at(displacement)
-        return Snapshot(
-            time=time,
-            displacement=displacement,
-            directors=directors,
-            section_forces=forces[:, :3],
-            section_moments=forces[:, 3:],
-            contact_pressure=nodal[:, 7] / net.node_lengths,
-            axes=axes,
-            shear_angle=axes_shear(axes) - self._reference_shear,
-            director_turn=self.shear_angles(),
-            crossing_moment=np.zeros(0) if self.crossings is None else self.crossings.moments(),
-        )
+        return self.whole(self.own_snapshot(time, outside))
 
-    @cached_property
-    def _reference_directors(self) -> tuple[Array, Array, Array]:
-        nodal = self.disc.nodal_directions()
-        d1, d3 = nodal["tangent"], nodal["normal"]
-        return d1, np.cross(d3, d1), d3
+    def own_snapshot(self, time: float, outside: dict[str, Array] | None = None) -> Snapshot:
+        """The same of this rank's part of the net (``disc.part``) only. Collective."""
+        return self._seen.own(time, self.outside() if outside is None else outside)
+
+    def whole(self, own: Snapshot) -> Snapshot:
+        """The whole net's snapshot from all ranks' own ones, on every rank. Collective."""
+        return self._seen.whole(own)

@@ -162,19 +162,22 @@ class Crossings:
 
     def angles(self) -> Array:
         """Shear angle γ at each crossing of the net [rad], on every rank. Collective."""
-        return self._gathered(self._angle)
+        return self.disc.gather_crossings(self.own_angles()[:, None])[:, 0]
 
-    def moments(self) -> Array:
-        """Moment between the tows of each crossing [N mm], on every rank. Collective."""
-        return self._gathered(self._moment)
+    def own_angles(self) -> Array:
+        """The same at this rank's crossings, in the order of the net."""
+        return self._evaluated(self._angle)
 
-    def _gathered(self, form: Any) -> Array:
-        own = np.zeros((0, 1))
-        if form is not None:
-            field = Function(self._space)
-            _dolfinx.add_vector(field.x.array, form)
-            own = self.disc.crossing_values(field)
-        return self.disc.gather_crossings(own)[:, 0]
+    def own_moments(self) -> Array:
+        """Moment between the tows of each of this rank's crossings [N mm]."""
+        return self._evaluated(self._moment)
+
+    def _evaluated(self, form: Any) -> Array:
+        if form is None:
+            return np.zeros(0)
+        field = Function(self._space)
+        _dolfinx.add_vector(field.x.array, form)
+        return self.disc.crossing_values(field)[:, 0]
 
 
 def _named(laws: Sequence[CrossingLaw]) -> list[tuple[str, CrossingLaw]]:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from ..fabric.axes import tow_axes
 from ..fabric.net import Net
+from ..fabric.part import Part
 
 __all__ = ["Snapshot", "at_rest"]
 
@@ -55,11 +56,11 @@ class Snapshot:
             raise ValueError(f"snapshot: time is {self.time}, not a finite number")
         self._check_shapes(len(self.displacement), len(self.section_forces), len(self.shear_angle))
 
-    def check(self, net: Net) -> None:
+    def check(self, net: Net | Part) -> None:
         """Make sure that the snapshot belongs to a net of this size.
 
         Args:
-            net: the net that the arrays should follow.
+            net: the net, or part of one, that the arrays should follow.
 
         Raises:
             ValueError: an array has another shape than the net asks for.

@@ -210,7 +210,7 @@ class CrossheadTest:
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """What a term without a formula depends on, at every reading; see Experiment."""
         assert isinstance(variant, FrameVariant)
-        if variant.by_run is not None:
+        if variant.by_run is not None and variant.shape is not None and not variant.shape.also:
             return self._recorded.at_readings(self._recorded.each(self._before["specimen"]).value)
         if variant.laws is None:
             whole = self._acting(self._force(self._points, (), values))

@@ -16,8 +16,12 @@ from .picture_frame.motion import Motion
 
 __all__ = [
     "FEWEST_BEFORE",
+    "FEWEST_BY_TURNS",
+    "SHARP",
+    "between_runs",
     "earlier_alike",
     "laid_out",
+    "last_run",
     "of_a_crossing",
     "runs_before",
     "shifted",
@@ -28,6 +32,10 @@ Array = npt.NDArray[np.float64]
 
 #: Runs before another that a term by the run needs: what two runs differ by is anything.
 FEWEST_BEFORE = 2
+#: Likewise of what is so at every other run, or from one run on.
+FEWEST_BY_TURNS = 3
+#: Share of a run over which a step from one to the next is, in place of at once.
+SHARP = 0.05
 #: Time step [s] to the first point of a record.
 BEFORE = 1e-9
 
@@ -69,6 +77,22 @@ def runs_before(readings: Readings) -> dict[str, Array]:
     first = np.unique(readings.run, return_index=True)[1]
     numbers = {"folder": readings.folder[first], "specimen": readings.specimen[first]}
     return {name: np.array(earlier_alike(own), dtype=float) for name, own in numbers.items()}
+
+
+def between_runs(last: float) -> tuple[float, ...]:
+    """Half-way from each run to the next, as shares of how many were before the last one."""
+    return tuple(((np.arange(last) + 0.5) / last).tolist())
+
+
+def last_run(before: Sequence[float] | Array, fitted: Sequence[int] | Array) -> float:
+    """How many runs were before the last one, 0 if too few were before the last fitted one.
+
+    Args:
+        before: how many were before each, (n_runs,).
+        fitted: numbers of those that are fitted.
+    """
+    every = np.asarray(before)
+    return float(every.max()) if every[fitted].max() >= FEWEST_BEFORE else 0.0
 
 
 def earlier_alike(numbers: Sequence[int] | npt.NDArray[np.int64]) -> list[int]:

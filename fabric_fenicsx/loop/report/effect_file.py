@@ -31,7 +31,7 @@ from typing import Any
 import fabric_fenicsx as ff
 
 # Moments per area of fabric [N], angles in rad, times in s.
-FOUND = ff.ShapedLaw(
+FOUND = ff.{law}(
 {numbers}
 )
 
@@ -150,12 +150,16 @@ def effect_file(term: Discovered, titles: str) -> str:
     if numbers.get("base") in OF_ELASTIC:
         numbers |= {"k1": term.values["k1_N"], "k3": term.values["k3_N"]}
     numbers = _plain(numbers)
-    if "base" in numbers:
+    if "base" in numbers or "law" in numbers:
+        words["law"] = "ShapedLaw"
+        if "law" in numbers:
+            words["law"] = numbers.pop("law").__name__
+            del numbers["variable"]
         lines = "\n".join(f"    {name}={value!r}," for name, value in numbers.items())
         carried: str = getattr(term.variant, "carried", "")
         words["carried"] = f'\n            carried="{carried}",' if carried else ""
         return (HEAD + LAW).format(numbers=lines, **words)
-    kept = ("memory", "turning", "slow", "way", "gain", "also", "stick_angle")
+    kept = ("memory", "turning", "slow", "way", "gain", "also", "stick_angle", "curve", "reach")
     more = "".join(f", {key}={numbers.pop(key)!r}" for key in kept if key in numbers)
     if "of" in numbers:
         words["found"] = FOUND_OF_THE_RUN.format(base=numbers.pop("of"), options=more)
@@ -168,10 +172,12 @@ def effect_file(term: Discovered, titles: str) -> str:
         words["reaches"] = f"REACH, ALSO_REACH = {words['reach']!r}, {also_reach!r}"
         words["added"] = ADDED_BY_TWO.format(also_x=shape.also, **words)
     else:
-        constant = numbers.pop("constant", 0.0)
+        constant, reach = numbers.pop("constant", 0.0), words["reach"]
+        if "last" in numbers:
+            reach, words["x"] = numbers.pop("last"), shape.also
         if numbers.pop("from_the_top", False):
             constant = -float(shape_of(x=1.0, **numbers))
-        words["reaches"] = f"REACH = {words['reach']!r}"
+        words["reaches"] = f"REACH = {reach!r}"
         words["added"] = ADDED.format(constant=constant, **words)
     return (HEAD + OF_THE_RIG).format(numbers=_lines(numbers), **words)
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from math import pi
 from typing import Any, Literal, Self
 
-from ufl import conditional, cos, exp, ge, gt, ln, lt, max_value, min_value, sin, tanh
+from ufl import conditional, cos, eq, exp, ge, gt, ln, lt, max_value, min_value, sin, tanh
 
 from ...inputs.groups import NotNegative, Positive
 from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, size_of
 
-__all__ = ["VARIABLES", "ShapedLaw", "product_of", "recent", "shape_of"]
+__all__ = ["VARIABLES", "Kind", "ShapedLaw", "each", "kept", "product_of", "recent", "shape_of"]
 
 Variable = Literal[
     "angle",
@@ -20,6 +20,7 @@ Variable = Literal[
     "largest_angle",
     "relative_angle",
     "path",
+    "since_reversal",
     "time",
     "unloading",
     "recent_angle",
@@ -43,18 +44,16 @@ Base = Literal[
     "outward",
     "forward",
     "flowing",
-    "lagging",
-    "lagging_even",
 ]
 
 
-def _each(at: Crossing, numbers: Sequence[Any]) -> list[Any]:
+def each(at: Crossing, numbers: Sequence[Any]) -> list[Any]:
     """Constants of the form, one for each of some numbers."""
     known = at.number(tuple(numbers)) if numbers else ()
     return [known[k] for k in range(len(numbers))]
 
 
-def _kept(per_time: Any, memory: Any) -> Any:
+def kept(per_time: Any, memory: Any) -> Any:
     """What is left of a memory after a step, exp(−Δt/τ)."""
     return exp(-1 / (per_time * memory))
 
@@ -68,13 +67,19 @@ def recent(x: Any, past: Any, per_time: Any, memory: Any) -> Any:
         per_time: 1/Δt [1/s].
         memory: τ [s].
     """
-    kept = _kept(per_time, memory)
-    return kept * past + (1 - kept) * x
+    left = kept(per_time, memory)
+    return left * past + (1 - left) * x
 
 
 def _relative(at: Crossing, largest: Any) -> Any:
     """|γ| over its largest value so far."""
     return at.size / max_value(largest, LEAST)
+
+
+def _way(at: Crossing, past: Any) -> Any:
+    """What γ has changed by since it last turned, and as it was in a hold."""
+    goes_on = conditional(gt(past * at.change, 0), past, 0.0)
+    return conditional(eq(at.change, 0), past, goes_on + at.change)
 
 
 def _unloading(at: Crossing, past: Any) -> Any:
@@ -89,11 +94,12 @@ VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
     "largest_angle": lambda at, past, memory: max_value(past, at.size),
     "relative_angle": lambda at, past, memory: _relative(at, max_value(past, at.size)),
     "path": lambda at, past, memory: past + size_of(at.change),
+    "since_reversal": lambda at, past, memory: size_of(_way(at, past)),
     "time": lambda at, past, memory: past + 1 / at.per_time,
     "unloading": lambda at, past, memory: _unloading(at, past),
     "recent_angle": lambda at, past, memory: recent(at.size, past, at.per_time, memory),
     "recent_largest_angle": lambda at, past, memory: max_value(
-        past * _kept(at.per_time, memory), at.size
+        past * kept(at.per_time, memory), at.size
     ),
     "recent_rate": lambda at, past, memory: recent(size_of(at.rate), past, at.per_time, memory),
     "recent_square_of_angle": lambda at, past, memory: recent(
@@ -103,15 +109,13 @@ VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
 }
 """What a factor may depend on, from the crossing, its value at the step before, and τ [s].
 
-Angles in rad, |γ| over its largest value so far, the path Σ|Δγ|, the time since the beginning [s];
+Angles in rad, |γ| over its largest value so far, the path Σ|Δγ| of all and since the last turn, the
+time since the beginning [s];
 all but the first two remember.
 """
 
 FRICTION = ("dissipative", "smooth", "flowing")
 """Bases that remember how far a stick is bent."""
-
-LAGGING = ("lagging", "lagging_even")
-"""Bases that are forgotten."""
 
 GRADED = (0.05, 0.1, 0.2, 0.4)
 """Knots of a graded spline between its ends."""
@@ -242,9 +246,7 @@ class ShapedLaw(CrossingLaw):
             "odd_in_rate" sign γ̇, "even_in_rate" 1, "outward" sign γ while |γ| grows, "forward" 1
             while γ grows. Of "rest" it is no factor but an angle, to which the spring has moved its
             state of rest: with e the elastic moment and s the sign of γ where it was largest so
-            far, M = e(γ − s (c₀ + f)) − e(γ), as of a permanent set. Of "lagging" it is a moment
-            g = f sign γ, of "lagging_even" g = f, that a fabric takes up and forgets, by the angle:
-            dM/dt = dg/dt − M/τ.
+            far, M = e(γ − s (c₀ + f)) − e(γ), as of a permanent set.
         variable: v, see VARIABLES.
         reach: v_max [rad, rad/s or s].
         coefficients: of f: [-] of the elastic base, [rad] of an angle of rest, [N mm s] of the
@@ -255,15 +257,14 @@ class ShapedLaw(CrossingLaw):
         k1, k3: of the elastic moment [N mm].
         stick_angle: δ, of a friction [rad].
         exponent, flow_rate: n > 1 and r [rad/s], of one that flows.
-        memory: τ of a variable, or of a moment, that forgets [s].
+        memory: τ of a variable that forgets [s].
         also: w, another variable that f depends on, if it does.
         also_reach: w_max [rad or rad/s].
         powers: p; ``coefficients`` has those of f_p for each in turn.
         constants: a_p, in the unit of the coefficients; none are all nothing.
 
     Raises:
-        ValueError: the numbers of coefficients, powers and constants do not go together, or what
-            lags is not by the angle alone.
+        ValueError: the numbers of coefficients, powers and constants do not go together.
     """
 
     base: Base = number("base", "of what it is a factor", Base)
@@ -288,9 +289,7 @@ class ShapedLaw(CrossingLaw):
     law = "shaped"
 
     def __post_init__(self) -> None:
-        """Compare numbers of coefficients, and base and variable."""
-        if self.base in LAGGING and (self.variable != "angle" or self.also is not None):
-            raise ValueError(f"base {self.base}: variable {self.variable}, allowed is angle alone")
+        """Compare numbers of coefficients."""
         if (self.also is None) != (not self.powers):
             raise ValueError("also and powers go together")
         if self.powers and len(self.coefficients) % len(self.powers):
@@ -325,12 +324,14 @@ class ShapedLaw(CrossingLaw):
     def _remembered(self, at: Crossing) -> Any:
         if self.variable == "relative_angle":
             return max_value(at.past("variable"), at.size)
+        if self.variable == "since_reversal":
+            return _way(at, at.past("variable"))
         return self.variable_at(at)
 
     def factor(self, at: Crossing) -> Any:
         """c₀ + f at the end of the step."""
         x = min_value(self.variable_at(at) / at.number(self.reach), 1)
-        parts, constants = (_each(at, numbers) for numbers in (self.coefficients, self.constants))
+        parts, constants = (each(at, numbers) for numbers in (self.coefficients, self.constants))
         place, width = (at.number(n) for n in (self.place, self.width))
         constant = at.number(self.constant)
         if self.also is None:
@@ -344,8 +345,6 @@ class ShapedLaw(CrossingLaw):
         if self.base == "rest":
             shifted = at.gamma - self._side(at) * self.factor(at)
             return self._elastic(at, shifted) - self._elastic(at, at.gamma)
-        if self.base in LAGGING:
-            return self._lagging(at)
         return self._base_at(at) * self.factor(at)
 
     def history(self, at: Crossing) -> dict[str, Any]:
@@ -359,24 +358,7 @@ class ShapedLaw(CrossingLaw):
             history |= {"largest": max_value(at.past("largest"), at.size), "side": self._side(at)}
         if self.base in FRICTION:
             history["stick"] = self._base_at(at)
-        if self.base in LAGGING:
-            history["lag"] = self._lagging(at)
         return history
-
-    def _lagging(self, at: Crossing) -> Any:
-        """M, exact where g changes evenly within the step."""
-        memory, reach = at.number(self.memory), at.number(self.reach)
-        place, width = at.number(self.place), at.number(self.width)
-        parts = _each(at, self.coefficients)
-
-        def taken_up(gamma: Any) -> Any:
-            x = min_value(size_of(gamma) / reach, 1)
-            size = shape_of(self.shape, parts, x, place, width)
-            return size if self.base == "lagging_even" else signed(gamma, size)
-
-        kept = _kept(at.per_time, memory)
-        change = taken_up(at.gamma) - taken_up(at.gamma_n)
-        return kept * at.past("lag") + change * memory * at.per_time * (1 - kept)
 
     def _side(self, at: Crossing) -> Any:
         """The sign of γ where it was largest so far."""

@@ -35,6 +35,7 @@ from ..picture_frame.model import SAME_RATE
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
 from ..records import shifted
+from .curves import Moment, at_knots, at_knots_back
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
 from .mixture import Part, Travels, number, of_groups, of_ways
@@ -53,8 +54,6 @@ Flags = npt.NDArray[np.bool_]
 #: Speeds of the crosshead that are told apart differ by this factor; of others strips are solved
 #: at the mean. Half as much again of a dashpot is not foretold where tows slip.
 PACE = 1.5
-#: Points of the way on which a law with memory is followed to its curve.
-ALONG = 60
 #: Parameter of the baseline's dashpot.
 DASHPOT = "c1_N_s"
 #: Share by which a curve, a slip or a crimp may differ from those that a fit was solved with.
@@ -138,7 +137,8 @@ class BiasExtension(CrossheadTest):
         if fabric.crossover is None:
             return
         laws = crossing_laws(fabric.crossover)
-        moments = self._at_knots([FrameVariant("the frame's", (), laws=lambda _: laws)], {}).value
+        frames = [FrameVariant("the frame's", (), laws=lambda _: laws)]
+        moments = at_knots(self._moment_of(frames, {}), self._typical_rate).value
         curve = locking(np.radians(KNOTS), moments)
         if curve[-1] > 0.0:
             form = locking_variant(np.radians(KNOTS), curve)
@@ -189,7 +189,9 @@ class BiasExtension(CrossheadTest):
         back = np.array([gone[own].max() for own in same]) > GONE_BACK * self._furthest
         self._back &= back
         self._phase = phases_of(D, rate, self._back)
-        stopped = (self._phase == Phase.STOPPED).any(axis=0)
+        # Of the points that are read: a record that is shorter than others rests at its last one.
+        stopped, (points, of) = np.zeros(len(runs), dtype=bool), self._recorded.place
+        np.logical_or.at(stopped, of, self._phase[points, of] == Phase.STOPPED)
         stops = np.array([stopped[own].any() for own in same])
         self._recorded_travels = Travels(D, self._phase, kept=True)
 
@@ -357,54 +359,26 @@ class BiasExtension(CrossheadTest):
         dashpot = values[DASHPOT]
         viscous, back = dashpot * self._typical_rate, None
         if self._back.any():
-            back = (self._at_knots_back(variants, values) + viscous) / size
+            moment = self._moment_of(_laws(variants), values)
+            back = (at_knots_back(moment, self._typical_rate, self._top) + viscous) / size
         return Curve.through((moments - viscous) / size, dashpot / size, back)
 
     def _moments(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Varying:
         """Moments of a model on one way out at the speed of the runs, at KNOTS."""
-        return self._at_knots(_laws(variants), values)
+        return at_knots(self._moment_of(_laws(variants), values), self._typical_rate)
 
-    def _at_knots(
+    def _moment_of(
         self, forms: Sequence[FrameVariant | None], values: Mapping[str, float]
-    ) -> Varying:
-        """The same of some forms; None: the baseline's."""
-        gamma = np.linspace(0.0, np.radians(KNOTS[-1]), ALONG)
-        found = self._along(forms, values, gamma)
+    ) -> Moment:
+        """The moment of some forms; None: the baseline's."""
 
-        def at_knots(along: Array) -> Array:
-            return np.interp(np.radians(KNOTS), gamma, along)
+        def total(known: dict[str, Varying]) -> Varying:
+            found = number(0.0)
+            for v in forms:
+                found += self._moment(v, known, values)
+            return found
 
-        return Varying(at_knots(found.value), {p: at_knots(s) for p, s in found.slopes.items()})
-
-    def _at_knots_back(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
-        """The same on the way back from the largest angle; beyond that with its last slope."""
-        out = np.linspace(0.0, self._top, ALONG)
-        total = self._along(_laws(variants), values, np.concatenate([out, out[-2::-1]]))
-        moment, known = total.value[-1 : ALONG - 1 : -1], out[:-1]
-        slope = max(float(moment[-1] - moment[-2]) / float(out[1]), 0.0)
-        beyond = slope * np.maximum(np.radians(KNOTS) - known[-1], 0.0)
-        return np.interp(np.radians(KNOTS), known, moment) + beyond
-
-    def _along(
-        self, forms: Sequence[FrameVariant | None], values: Mapping[str, float], way: Array
-    ) -> Varying:
-        """Moments [N/mm] along angles [rad] at equal steps, (n,) each; None: the baseline's."""
-        gamma, rate = way[:, None], self._typical_rate
-        direction = np.sign(np.diff(gamma, axis=0, prepend=-1.0))
-        known = {
-            "gamma": Varying(gamma),
-            "gamma_n": Varying(shifted(gamma)),
-            "rate": Varying(rate * direction),
-            "per_time": Varying(np.full_like(gamma, rate / float(way[1]))),
-        }
-        total = number(0.0)
-        for v in forms:
-            total += self._moment(v, known, values)
-
-        def whole(values: Array) -> Array:
-            return np.broadcast_to(values, gamma.shape)[:, 0]
-
-        return Varying(whole(total.value), {p: whole(s) for p, s in total.slopes.items()})
+        return total
 
     def _size(self, moments: Varying) -> Varying:
         """Work of moments at KNOTS, over that of the first strips' curve on the same way."""
@@ -510,7 +484,7 @@ class BiasExtension(CrossheadTest):
 
 
 def _laws(variants: Sequence[Variant]) -> list[FrameVariant | None]:
-    """The baseline's laws and those of forms; see BiasExtension._along."""
+    """The baseline's laws and those of forms."""
     own = [v for v in variants if isinstance(v, FrameVariant) and v.laws is not None]
     return [None, *own]
 

@@ -30,7 +30,7 @@ from ...inference.effects import Effect, Parameter, Variant, of_each_run, scaled
 from ...inference.experiment import NO_DEVIATIONS, Deviations, Law
 from ...measurement.readings import common_noise, readings_of, specimens_of
 from ...measurement.schema import Measurement
-from ..records import FEWEST_BEFORE, earlier_alike
+from ..records import FEWEST_BEFORE, earlier_alike, last_run
 from .effects import CANTILEVER_EFFECTS
 from .hanging import HangingTow, Laws, Shape, sum_of
 from .measured_line import scatter_of_x, smooth_line
@@ -173,7 +173,7 @@ class Cantilever:
             "x": float(np.abs(x[rows]).max()),
             "z": float(np.abs(self._observed[rows]).max()),
             "stiffness_per_C1": self.stiffness_per_C1,
-            "runs": float(np.asarray(self._before)[self._run[rows]].max()),
+            "runs": last_run(self._before, np.unique(self._run[rows])),
         }
         return terms(ranges, np.unique(self._run[rows]).tolist())
 

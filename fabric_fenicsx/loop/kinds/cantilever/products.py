@@ -19,7 +19,7 @@ from typing import Any
 
 from ...inference.effects import Effect, Shape, Values
 from ..records import FEWEST_BEFORE
-from .shapes import SPLINES, Drawn, Of, over_runs, splines
+from .shapes import SPLINES, Drawn, Of, by_turns, over_runs, splines
 from .term import X, Y, of_strip, on_the_strip, strip_effect, strip_form, times, turned
 from .variant import StripVariant
 
@@ -39,7 +39,7 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
     last = ranges.get("runs", 0.0)
     if last < FEWEST_BEFORE:
         return
-    yield from _turned_by("run", last, over_runs)
+    yield from _turned_by("run", last, partial(_turns_of_runs, last=last))
     name = "reading_of_height_and_run"
     forms = [
         StripVariant(
@@ -48,7 +48,7 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
             shape=Shape(X["run"], "share_of_height", last, g),
             camera=partial(_scaled, g, "run", last),
         )
-        for label, parameters, g in over_runs(name)
+        for label, parameters, g in over_runs(name, last)
     ]
     about = "scale of heights that changes from run to run"
     yield strip_effect(name, about, "reading", ("height", "run"), forms)
@@ -63,7 +63,7 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
                 acts_on,
                 partial(_along, unit, g, last, ranges["length"]),
             )
-            for label, parameters, g in over_runs(name)
+            for label, parameters, g in over_runs(name, last)
         ]
         about = f"{what} that changes along the strip and from run to run"
         yield strip_effect(name, about, acts_on, ("arc_length", "run"), forms, of_two=True)
@@ -85,6 +85,12 @@ def _turned_by(
     ]
     about = f"a camera that is turned more or less by the {CALLED[variable]}"
     yield strip_effect(name, about, "reading", ("distance", variable), forms)
+
+
+def _turns_of_runs(name: str, last: float) -> Iterator[Drawn]:
+    """As ``over_runs``; of two cameras, or of a strip's two ends, none need be upright."""
+    yield from over_runs(name, last)
+    yield from by_turns(name, last, constant=True)
 
 
 def _turned(g: Of, by: str, most: float, p: Values, at: Values) -> tuple[Any, Any]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from math import pi
 from typing import Any
 
 import numpy as np
-from ufl import exp
+from ufl import cos, exp
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import shape_of
 from ...inference.effects import Values
+from ..records import FEWEST_BY_TURNS, SHARP, between_runs
 
 __all__ = [
     "HEAVIEST",
@@ -21,6 +23,7 @@ __all__ = [
     "Drawn",
     "Of",
     "along_the_strip",
+    "by_turns",
     "coefficient",
     "over_runs",
     "places",
@@ -116,8 +119,8 @@ def coefficient(name: str) -> Parameter:
     return Parameter(name, lower=-LARGEST, upper=LARGEST, amplitude=True)
 
 
-def over_runs(name: str, *, constant: bool = False) -> Iterator[Drawn]:
-    """Shapes over the few runs that there are."""
+def over_runs(name: str, last: float, *, constant: bool = False) -> Iterator[Drawn]:
+    """Shapes over the few runs that there are, so many of them before the last one."""
     yield from splines(name, SPLINES, constant=constant)
     zero = (coefficient(f"{name}_0"),) if constant else ()
     one, width = coefficient(f"{name}_1"), Parameter(f"{name}_width", FADING, 0.1, 2.0)
@@ -126,6 +129,29 @@ def over_runs(name: str, *, constant: bool = False) -> Iterator[Drawn]:
         return sum(p[c.name] for c in zero) + p[one.name] * (1 - exp(-x / p[width.name]))
 
     yield "saturation", (*zero, one, width), saturating
+    yield from by_turns(name, last, constant=constant)
+    if last < FEWEST_BY_TURNS:
+        return
+    place = Parameter(f"{name}_place", between_runs(last), 0.0, 1.0)
+
+    def stepping(p: Values, x: Any) -> Any:
+        step = _shape("step", p, (one,), p[place.name], SHARP / last, x)
+        return sum(p[c.name] for c in zero) + step
+
+    yield "step", (*zero, one, place), stepping
+
+
+def by_turns(name: str, last: float, *, constant: bool = False) -> Iterator[Drawn]:
+    """What is so at every other run, of so many before the last one."""
+    if last < FEWEST_BY_TURNS:
+        return
+    zero = (coefficient(f"{name}_0"),) if constant else ()
+    one = coefficient(f"{name}_1")
+
+    def turning(p: Values, x: Any) -> Any:
+        return sum(p[c.name] for c in zero) + p[one.name] * (1 - cos(pi * last * x)) / 2
+
+    yield "by turns", (*zero, one), turning
 
 
 def _shape(kind: str, p: Values, own: Iterable[Parameter], place: Any, width: Any, x: Any) -> Any:

@@ -68,8 +68,8 @@ BEYOND = 1.1
 PER_C1 = "stiffness_per_C1"
 #: Points of a bending moment as a table.
 TABULATED = 25
-#: Places are counted from there.
-ENDS = ("clamp", "free end")
+ENDS = {"clamp": ("arc_length",), "free end": ("arc_length", "length")}
+"""Where places are counted from, and what they are made of."""
 
 
 def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
@@ -184,26 +184,23 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
     for acts_on, unit, about in on_the_strip(ranges):
         # A weight that is even is no other than B, and a curvature has nothing to stand for it.
         constant = acts_on == "rest_curvature"
-        name = f"{acts_on}_of_arc_length"
-        forms = [
-            strip_form(
-                _from(label, end),
-                parameters,
-                Shape(X[end], Y[acts_on], longest, partial(times, unit, g)),
-                acts_on,
-                partial(_of_place, unit, g, end, longest),
-            )
-            for end in ENDS
-            for label, parameters, g in (
-                *along_the_strip(
-                    name, end, constant=constant, most=LARGEST if constant else HEAVIEST
-                ),
-                *([wave(name)] if constant and end == "clamp" else []),
-            )
-        ]
-        yield strip_effect(
-            name, f"{about} that varies along the strip", acts_on, ("arc_length",), forms
-        )
+        for end, depends_on in ENDS.items():
+            name = f"{acts_on}_of_{'_and_'.join(depends_on)}"
+            most = LARGEST if constant else HEAVIEST
+            drawn = [*along_the_strip(name, end, constant=constant, most=most)]
+            drawn += [wave(name)] if constant and end == "clamp" else []
+            forms = [
+                strip_form(
+                    _from(label, end),
+                    parameters,
+                    Shape(X[end], Y[acts_on], longest, partial(times, unit, g)),
+                    acts_on,
+                    partial(_of_place, unit, g, end, longest),
+                )
+                for label, parameters, g in drawn
+            ]
+            words = f"{about} that varies along the strip"
+            yield strip_effect(name, words, acts_on, depends_on, forms)
         name = f"{acts_on}_of_length"
         forms = [
             form_of_strip(drawn, acts_on, unit, "length", longest)
@@ -326,7 +323,7 @@ def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
             shape=Shape(X["run"], "log_flexibility", last, g),
             added_moment=partial(_softened, g, last),
         )
-        for label, parameters, g in over_runs(name)
+        for label, parameters, g in over_runs(name, last)
     ]
     about = "bending stiffness that changes from run to run of a specimen"
     yield strip_effect(name, about, "bending_moment", ("run",), forms)
@@ -334,7 +331,7 @@ def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
         name = f"{acts_on}_of_run"
         forms = [
             form_of_strip(drawn, acts_on, unit, "run", last)
-            for drawn in over_runs(name, constant=acts_on == "rest_curvature")
+            for drawn in over_runs(name, last, constant=acts_on == "rest_curvature")
         ]
         words = f"{about} that changes from run to run of a specimen"
         yield strip_effect(name, words, acts_on, ("run",), forms)

@@ -26,11 +26,12 @@ from ...inference.effects import Effect
 from ...inference.experiment import OneCurve
 from ...measurement.schema import Measurement, Run
 from ..crosshead import CrossheadTest
-from ..records import shifted
+from ..records import last_run, shifted
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
 from .products import products
 from .rig_products import rig_products
+from .run_terms import run_terms
 from .terms import ranges_of, terms
 from .variant import FrameVariant
 
@@ -80,12 +81,13 @@ class PictureFrame(CrossheadTest):
             return []
         ranges = self._ranges()
         fitted = np.unique(self.readings.run[self.readings.fit])
-        ranges |= {f"run_of_{name}": max(n[fitted]) for name, n in self._before.items()}
-        if ranges["run_of_specimen"]:
+        ranges |= {f"run_of_{name}": last_run(n, fitted) for name, n in self._before.items()}
+        if self._before["specimen"][fitted].any():
             whole = self._past_of_specimens["path"] + self._paths
             ranges["path_of_specimen"] = float(whole[fitted].max())
         largest = ranges_of(ranges)
-        return [*terms(largest, self._ends()), *products(largest), *rig_products(largest)]
+        of_one = [*terms(largest, self._ends()), *run_terms(largest)]
+        return [*of_one, *products(largest), *rig_products(largest)]
 
     @property
     def one_curve(self) -> OneCurve | None:

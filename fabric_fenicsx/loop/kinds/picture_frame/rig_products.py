@@ -17,7 +17,7 @@ from ufl import max_value, min_value
 from ....inputs.parameters import Parameter
 from ...inference.effects import Effect, Shape, Values
 from .rig_terms import of_the_rig, rig_term
-from .shapes import X, Y, fitted, of_powers, over_runs, product, shapes
+from .shapes import X, Y, fitted, of_powers, over, product
 from .variant import FrameVariant
 
 __all__ = ["rig_products"]
@@ -72,8 +72,7 @@ def _forms(
     powers: tuple[int, ...],
     largest: Mapping[str, float],
 ) -> Iterator[FrameVariant]:
-    drawn = over_runs(name) if v == "run" else shapes(name, 3)
-    for label, one, numbers in drawn:
+    for label, one, numbers in over(v, name, 3, largest[v]):
         coefficients = of_powers(name, powers, one)
         if coefficients is None:
             continue

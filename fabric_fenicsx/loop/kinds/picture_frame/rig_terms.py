@@ -13,7 +13,7 @@ from ....inputs.parameters import Parameter
 from ....mechanics.laws.law import size_of
 from ....mechanics.laws.shaped import recent, shape_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .shapes import Ends, X, Y, bumps, factor, fitted, memory_of, over_runs, shapes, waves, wealth
+from .shapes import Ends, X, Y, bumps, factor, fitted, memory_of, over, shapes, waves, wealth
 from .variant import FrameVariant
 
 __all__ = ["RIG_VARIABLES", "RigVariable", "of_the_rig", "rig_term", "rig_terms"]
@@ -200,7 +200,10 @@ def _forms(
     """Forms of what is added."""
     reach = largest[variable.removesuffix("_size")]
     between = ends.get(variable.removeprefix("recent_"), (0.0, 1.0))
-    shapes_of = list(_gains(name, variable) if gain else _added(name, variable, turning, between))
+    drawn = (
+        _gains(name, variable, reach) if gain else _added(name, variable, turning, between, reach)
+    )
+    shapes_of = list(drawn)
     if between[0] < 0.0 < between[1] and variable not in LINES and not gain:
         sides = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("odd", "even"))
         shapes_of.append(
@@ -312,20 +315,22 @@ def of_the_rig(
     )
 
 
-def _gains(name: str, variable: str) -> Iterator[tuple[str, dict[str, Any]]]:
+def _gains(name: str, variable: str, reach: float) -> Iterator[tuple[str, dict[str, Any]]]:
     """Label and numbers of a gain's shapes, which change it from what it is at the beginning.
 
     That of the force is what it is at the largest one: small ones may not be read at all.
     """
     of_the_force = variable == "force_size"
     chosen = ("step", "saturation") if of_the_force else ()
-    own = over_runs(name) if variable == "run" else shapes(name, 3)
-    for label, coefficients, numbers in own:
+    for label, coefficients, numbers in over(variable, name, 3, reach):
         if label in chosen or not chosen:
             top = {"from_the_top": True} if of_the_force else {}
             yield label, numbers | {"coefficients": coefficients} | top
-    if variable == "time":
-        for label, coefficients, numbers in waves(name, CYCLES["time"], (0, 2)):
+    if variable in CYCLES:
+        # In time nothing need be a sine: what is switched is not.
+        overtones = (0, 2) if variable == "time" else (0,)
+        drawn = *waves(name, CYCLES[variable], overtones), *bumps(name)
+        for label, coefficients, numbers in drawn:
             yield label, numbers | {"coefficients": coefficients}
 
 
@@ -350,7 +355,7 @@ def _zero(name: str, turning: Turning) -> dict[str, Parameter]:
 
 
 def _added(
-    name: str, variable: str, turning: Turning, between: tuple[float, float]
+    name: str, variable: str, turning: Turning, between: tuple[float, float], reach: float
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Label and numbers of shapes."""
     one = (Parameter(f"{name}_1", amplitude=True),)
@@ -374,7 +379,7 @@ def _added(
         if turning in ("kept in a hold", "over a way")
         else wealth(name.partition("_")[0], variable)
     )
-    for label, coefficients, numbers in over_runs(name) if variable == "run" else shapes(name, few):
+    for label, coefficients, numbers in over(variable, name, few, reach):
         yield label, numbers | {"coefficients": coefficients} | constant
     if variable in ("time", "displacement") and not turning:
         for label, coefficients, numbers in bumps(name, between):

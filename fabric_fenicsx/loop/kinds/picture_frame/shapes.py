@@ -10,11 +10,13 @@ import numpy as np
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import GRADED, product_of, shape_of
 from ...inference.effects import Values, valued
+from ..records import FEWEST_BY_TURNS, SHARP, between_runs
 
 __all__ = [
     "FINE",
     "FORGETFUL",
     "SQUARES",
+    "Drawn",
     "Ends",
     "X",
     "Y",
@@ -23,6 +25,7 @@ __all__ = [
     "fitted",
     "memory_of",
     "of_powers",
+    "over",
     "over_runs",
     "product",
     "remembered_since",
@@ -66,6 +69,12 @@ FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate", *SQUARES)
 CARRIED = {"largest_angle": "largest_angle", "relative_angle": "largest_angle", "path": "path"}
 """What variables have from earlier runs of a specimen; see FrameVariant.carried."""
 
+Coefficient = Parameter | float
+"""Of a shape: one that is fitted, or one that is not."""
+
+Drawn = tuple[str, tuple[Coefficient, ...], dict[str, Any]]
+"""A shape: label, coefficients and other numbers of it."""
+
 Ends = Mapping[str, tuple[float, float]]
 """Between which shares of their largest sizes variables were, by their names."""
 
@@ -76,6 +85,7 @@ X = {
     "recent_angle": "recent_angle_rad",
     "recent_largest_angle": "recent_largest_angle_rad",
     "path": "path_rad",
+    "since_reversal": "path_since_reversal_rad",
     "rate": "shear_rate_rad_s",
     "recent_rate": "recent_rate_rad_s",
     "recent_square_of_angle": "recent_square_of_angle_rad2",
@@ -126,13 +136,15 @@ def factor(numbers: Mapping[str, Any], values: Values, x: Any) -> Any:
 
 
 def of_powers(
-    name: str, powers: Sequence[int], one: Sequence[Parameter]
-) -> tuple[Parameter, ...] | None:
+    name: str, powers: Sequence[int], one: Sequence[Coefficient]
+) -> tuple[Coefficient, ...] | None:
     """Coefficients of a product, so many of each power; None if they are too many."""
     if len(powers) * len(one) > MOST:
         return None
     return tuple(
-        Parameter(f"{name}_{p}_{k + 1}", amplitude=True) for p in powers for k in range(len(one))
+        Parameter(f"{name}_{p}_{k + 1}", amplitude=True) if isinstance(c, Parameter) else c
+        for p in powers
+        for k, c in enumerate(one)
     )
 
 
@@ -173,7 +185,7 @@ def wealth(base: str, variable: str) -> int:
     return 3 if variable in (*FORGETFUL, "recent_force", "mean_speed") else 4
 
 
-def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
+def shapes(name: str, wealth: int) -> Iterator[Drawn]:
     """Shapes over one variable: label, coefficients, other numbers of the shape.
 
     Args:
@@ -197,9 +209,7 @@ def shapes(name: str, wealth: int) -> Iterator[tuple[str, tuple[Parameter, ...],
         yield "logarithm", one, {"shape": "logarithm", "width": bend}
 
 
-def waves(
-    name: str, most: float, overtones: Sequence[int] = (0,)
-) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
+def waves(name: str, most: float, overtones: Sequence[int] = (0,)) -> Iterator[Drawn]:
     """Waves with at most so many cycles over the range, and so many overtones each: as shapes."""
     periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
     period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
@@ -213,9 +223,7 @@ def waves(
         yield label, tuple(own), {"shape": "periodic", "width": period}
 
 
-def bumps(
-    name: str, ends: tuple[float, float] = (0.0, 1.0)
-) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
+def bumps(name: str, ends: tuple[float, float] = (0.0, 1.0)) -> Iterator[Drawn]:
     """What is at one place alone, on one side of it or on both: as shapes.
 
     Args:
@@ -230,7 +238,23 @@ def bumps(
     yield "bump", own, {"shape": "bump", "place": place, "width": width}
 
 
-def over_runs(name: str) -> Iterator[tuple[str, tuple[Parameter, ...], dict[str, Any]]]:
-    """Shapes over the few runs that there are: as ``shapes``, but no more than two numbers."""
+def over(variable: str, name: str, wealth: int, reach: float) -> Iterator[Drawn]:
+    """Shapes over a variable, as ``shapes``, or over the runs, as ``over_runs``."""
+    yield from over_runs(name, reach) if variable == "run" else shapes(name, wealth)
+
+
+def over_runs(name: str, last: float) -> Iterator[Drawn]:
+    """Shapes over the few runs that there are: as ``shapes``, but no more than two numbers.
+
+    Args:
+        name: of the term.
+        last: how many runs were before the last one.
+    """
     chosen = ("linear", "2 coefficients", "saturation")
-    return (shape for shape in shapes(name, 2) if shape[0] in chosen)
+    yield from (shape for shape in shapes(name, 2) if shape[0] in chosen)
+    if last < FEWEST_BY_TURNS:
+        return
+    one = Parameter(f"{name}_1", amplitude=True)
+    yield "by turns", (0.0, one), {"shape": "periodic", "width": 2.0 / last}
+    place = Parameter(f"{name}_place", tuple(between_runs(last)), 0.0, 1.0)
+    yield "step", (one,), {"shape": "step", "place": place, "width": SHARP / last}

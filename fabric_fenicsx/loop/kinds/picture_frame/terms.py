@@ -6,24 +6,22 @@ and stands for whatever law of that variable there is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-from ufl import min_value
-
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.dashpots import LinearDashpot
+from ....mechanics.laws.lagging import Lagging
 from ....mechanics.laws.law import CrossingLaw
 from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ShapedLaw
-from ....mechanics.laws.springs import PolynomialSpring
 from ...inference.effects import Effect, Shape, Values, valued
 from ..records import FEWEST_BEFORE
 from .rig_terms import rig_terms
 from .shapes import (
     FINE,
     FORGETFUL,
+    Drawn,
     Ends,
     X,
     Y,
@@ -31,7 +29,6 @@ from .shapes import (
     factor,
     fitted,
     memory_of,
-    over_runs,
     remembered_since,
     shapes,
     waves,
@@ -39,10 +36,14 @@ from .shapes import (
 )
 from .variant import FrameVariant
 
-__all__ = ["as_reported", "of_a_law", "of_the_run", "ranges_of", "remembering", "terms"]
+__all__ = ["as_reported", "of_a_law", "ranges_of", "remembering", "terms"]
 
 #: Angles in which a friction begins to slide [rad].
 STICKS = (0.005, 0.03)
+#: Plays of what follows the angle, as shares of the largest one.
+PLAYS = (0.02, 0.1, 0.3)
+#: By how much longer a memory may get in a time, as a share of that.
+GROWTHS = (0.1, 1.0)
 #: Powers of a moment that a flow is in proportion to: between a dashpot's 1 and a yield's many.
 EXPONENTS = (2.0, 8.0)
 #: Most cycles of a moment over the angles, as of tows that ride over each other's crimp, and over
@@ -52,6 +53,7 @@ CYCLES = {
     ("elastic", "time"): 40.0,
     ("viscous", "time"): 40.0,
     ("dissipative", "time"): 40.0,
+    ("dissipative", "since_reversal"): 8.0,
 }
 #: In time nothing need be a sine: what is switched is not.
 OVERTONES = {"time": (0, 2)}
@@ -63,18 +65,17 @@ def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> lis
     Args:
         ranges: largest size in the fitted readings of "angle", "rate", "path" [rad], "time" [s],
             "displacement" [mm], "speed" [mm/s], "acceleration" [mm/s²], "force" [N] and of its
-            change, "force_rate" [N/s], and how many runs were before, "run_of_folder" and
-            "run_of_specimen": with less than two of them, or none given, there are no terms by the
-            run. "path_of_specimen" [rad] is that of all runs, where a specimen had several: a
-            memory may then go on from one to the next.
+            change, "force_rate" [N/s], and how many runs were before, "run_of_folder": with less
+            than two of them, or none given, there are no terms by the run. "path_of_specimen" [rad]
+            is that of all runs, where a specimen had several: a memory may then go on from one to
+            the next.
         ends: of those that may be negative.
     """
     largest = ranges_of(ranges)
     return [
         *_of_the_crossing(largest),
         *_flowing(largest),
-        _lagging(largest),
-        *_by_run(largest),
+        *_lagging(largest),
         *rig_terms(largest, ends),
     ]
 
@@ -86,7 +87,7 @@ def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
     largest |= {"displacement_lag": ranges["displacement"]}
     largest |= {"mean_speed": ranges["speed"]}
     largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
-    largest["relative_angle"] = 1.0
+    largest |= {"relative_angle": 1.0, "since_reversal": ranges["angle"]}
     largest |= {f"recent_square_of_{name}": ranges[name] ** 2 for name in ("angle", "rate")}
     if ranges.get("run_of_folder", 0.0) >= FEWEST_BEFORE:
         largest["run"] = ranges["run_of_folder"]
@@ -95,10 +96,27 @@ def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
 
 def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
     bases: dict[str, tuple[str, ...]] = {
-        "elastic": ("largest_angle", "path", "time", "rate", "unloading", *FORGETFUL),
+        "elastic": (
+            "largest_angle",
+            "path",
+            "since_reversal",
+            "time",
+            "rate",
+            "unloading",
+            *FORGETFUL,
+        ),
         "rest": ("largest_angle", "path", "time"),
         "viscous": ("angle", "largest_angle", "path", "time", "unloading", *FORGETFUL),
-        "dissipative": ("angle", "largest_angle", "path", "time", "rate", "unloading", *FORGETFUL),
+        "dissipative": (
+            "angle",
+            "largest_angle",
+            "path",
+            "since_reversal",
+            "time",
+            "rate",
+            "unloading",
+            *FORGETFUL,
+        ),
         "odd": ("angle",),
         "even": ("angle",),
         "odd_in_rate": ("rate",),
@@ -152,92 +170,53 @@ def _flowing(largest: Mapping[str, float]) -> Iterator[Effect]:
         )
 
 
-def _lagging(largest: Mapping[str, float]) -> Effect:
-    """What is taken up at once and forgotten; a Maxwell branch whose spring is not straight."""
-    name = "lagging_moment_of_angle_and_history"
-    fixed: dict[str, Any] = {"variable": "angle", "reach": largest["angle"]}
-    fixed["memory"] = memory_of(name, largest)
+def _lagging(largest: Mapping[str, float]) -> Iterator[Effect]:
+    """What is taken up by the angle and forgotten, or follows it with a play, or the rate late."""
+    name, angle = "lagging_moment_of_angle_and_history", largest["angle"]
+    memory: dict[str, Any] = {"memory": memory_of(name, largest)}
+    starts = tuple(share * angle for share in PLAYS)
+    play = {"play": Parameter(f"{name}_play_rad", starts, 1e-3 * angle, angle)}
+    drawn = [*shapes(name, 3)]
+    kinds = (
+        # An odd line that is forgotten is a listed effect.
+        ("", drawn[1:], memory),
+        (", even", drawn, memory | {"even": True}),
+        (", pulling forth", drawn[:2], memory | {"pulls": 1}),
+        (", pulling back", drawn[:2], memory | {"pulls": -1}),
+        (", play", drawn[:3], play),
+    )
+    about = "moment of the angle that is forgotten, or follows with a play"
+    yield _lagging_effect(name, about, ("angle", "history"), kinds, angle)
+
+    name = "lagging_moment_of_angle_history_and_time"
+    growth = Parameter(f"{name}_growth", GROWTHS, 0.0, 20.0)
+    ageing = {"memory": memory_of(name, largest), "growth": growth}
+    about = "moment of the angle that is forgotten the slower the later it is"
+    depends_on = ("angle", "history", "time")
+    yield _lagging_effect(name, about, depends_on, (("", [*shapes(name, 2)][:2], ageing),), angle)
+
+    name = "lagging_moment_of_rate_and_history"
+    late = {"by": "rate", "memory": memory_of(name, largest)}
+    about, drawn = "moment of the rate that comes late", [*shapes(name, 3)]
+    yield _lagging_effect(name, about, ("rate", "history"), (("", drawn, late),), largest["rate"])
+
+
+def _lagging_effect(
+    name: str,
+    about: str,
+    depends_on: tuple[str, ...],
+    kinds: Iterable[tuple[str, Sequence[Drawn], Mapping[str, Any]]],
+    reach: float,
+) -> Effect:
+    """A term with some shapes of each kind, which has a name and numbers."""
+    fixed = {"law": Lagging, "variable": depends_on[0], "reach": reach}
     forms = [
-        _law_form(f"{label}{words}", fixed | numbers | {"base": base, "coefficients": coefficients})
-        for base, words in (("lagging", ""), ("lagging_even", ", even"))
-        for label, coefficients, numbers in shapes(name, 3)
-        # An odd line is a listed effect.
-        if (base, label) != ("lagging", "linear")
+        _law_form(label + words, {**fixed, **numbers, **also, "coefficients": coefficients})
+        for words, drawn, also in kinds
+        for label, coefficients, numbers in drawn
     ]
-    about = "moment of the angle that is forgotten"
-    depends_on = ("angle", "history")
     return Effect(
         name, "picture_frame", about, tuple(forms), acts_on="moment", depends_on=depends_on
-    )
-
-
-def _by_run(largest: Mapping[str, float]) -> Iterator[Effect]:
-    """What changes from one run of a specimen to the next."""
-    reach = largest.get("run_of_specimen", 0.0)
-    if reach < FEWEST_BEFORE:
-        return
-    bases = {"elastic": (), "viscous": ("rate",), "dissipative": ("direction",)}
-    for base, also in bases.items():
-        name = f"{base}_moment_of_run"
-        fixed: dict[str, Any] = {"of": base}
-        fixed |= remembering(name, base, "run", largest)
-        if base in FRICTION:
-            fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
-        forms = []
-        for label, coefficients, numbers in over_runs(name):
-            own = fixed | numbers | {"coefficients": coefficients}
-            value = partial(factor, own)
-            shape = Shape(X["run"], Y.get(base, "moment_N"), reach, value, own)
-            share, stick = partial(_share, value, reach), own.get("stick_angle", 0.0)
-            forms.append(
-                of_the_run(label, fitted(own), base, share, stick_angle=stick, shape=shape)
-            )
-        yield Effect(
-            name,
-            "picture_frame",
-            f"{base} moment, by the run of a specimen",
-            tuple(forms),
-            of_fabric=False,
-            acts_on="moment",
-            depends_on=("run", *also),
-        )
-
-
-def _share(value: Any, reach: float, p: Values, run: Any) -> Any:
-    return value(p, min_value(run / reach, 1))
-
-
-def of_the_run(
-    label: str,
-    parameters: tuple[Parameter, ...],
-    base: str,
-    share: Callable[[Values, Any], Any],
-    *,
-    stick_angle: Any = 0.0,
-    shape: Shape | None = None,
-) -> FrameVariant:
-    """A form of what a moment changes by from one run of a specimen to the next.
-
-    Args:
-        label: what tells it from other forms.
-        parameters: its numbers.
-        base: "elastic", of the spring, "viscous", of the rate, or "dissipative", a friction of 1.
-        share: how many times that is added, from the parameters and how many runs were before.
-        stick_angle: of a friction [rad], or the parameter that is one.
-        shape: of a term without a formula.
-    """
-
-    def laws(values: Values) -> tuple[CrossingLaw, ...]:
-        if base == "viscous":
-            return (LinearDashpot(1.0),)
-        if base in FRICTION:
-            stick, one = valued(stick_angle, values), {"coefficients": (0.0,), "constant": 1.0}
-            return (ShapedLaw(base, "angle", 1.0, **one, stick_angle=stick),)  # type: ignore[arg-type]
-        return (PolynomialSpring(k1=values["k1_N"], k3=values["k3_N"]),)
-
-    of_baseline = ("k1_N", "k3_N") if base in OF_ELASTIC else ()
-    return FrameVariant(
-        label, parameters, shape=shape, laws=laws, by_run=share, of_baseline=of_baseline
     )
 
 
@@ -251,7 +230,11 @@ ABOUT = {
 """What a base is called where its name does not do."""
 
 
-CALLED = {"unloading": "direction", "relative_angle": "largest_angle"}
+CALLED = {
+    "unloading": "direction",
+    "relative_angle": "largest_angle",
+    "since_reversal": "history",
+}
 
 
 def as_reported(variables: Sequence[str]) -> dict[str, list[str]]:
@@ -303,7 +286,7 @@ def _law_form(
     label: str, own: Mapping[str, Any], carried: str = "", like: FrameVariant | None = None
 ) -> FrameVariant:
     """A form of a law over one variable, from its numbers."""
-    variable, base = own["variable"], own["base"]
+    variable, base = own["variable"], own.get("base", "")
     return FrameVariant(
         label,
         fitted(own),
@@ -315,9 +298,12 @@ def _law_form(
     )
 
 
-def of_a_law(numbers: Mapping[str, Any], values: Values) -> tuple[ShapedLaw, ...]:
+def of_a_law(numbers: Mapping[str, Any], values: Values) -> tuple[CrossingLaw, ...]:
     """The law of a term's numbers, some of them parameters."""
     own = {key: valued(n, values) for key, n in numbers.items()}
+    if "law" in own:
+        law, _ = own.pop("law"), own.pop("variable")
+        return (law(**own),)
     if own["base"] in OF_ELASTIC:
         own |= {"k1": values["k1_N"], "k3": values["k3_N"]}
     return (ShapedLaw(**own),)

@@ -1,0 +1,126 @@
+"""What is seen of a model: each rank sees its own part of the net, whoever asks the whole of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from ..fabric.axes import TowAxes, axes_shear
+from ..fabric.part import Where
+from .exchange import Copies, Gather
+from .snapshot import Snapshot
+from .update import rotate
+
+if TYPE_CHECKING:
+    from .model import Model
+
+__all__ = ["PLACES", "Seen"]
+
+Array = npt.NDArray[np.float64]
+
+PLACES: dict[str, Where] = {
+    "displacement": "nodes",
+    "directors": "nodes",
+    "contact_pressure": "nodes",
+    "section_forces": "cells",
+    "section_moments": "cells",
+    "axes": "crossings",
+    "shear_angle": "crossings",
+    "director_turn": "crossings",
+    "crossing_moment": "crossings",
+}
+"""Arrays of a snapshot, and what of the net they belong to."""
+
+
+class Seen:
+    """Snapshots of a model.
+
+    A rank asks the others for what it sees of their nodes: the other ends of its cells and
+    crossings, and the next places on the tows through its crossings, for the tows' directions.
+
+    Args:
+        model: what is seen.
+        symmetry: axes whose planes through the origin mirror the net.
+    """
+
+    def __init__(self, model: Model, symmetry: Sequence[int]) -> None:
+        self._model = model
+        net, disc = model.net, model.disc
+        part = disc.part
+        axes = TowAxes.of(net, symmetry, crossings=part.crossing_numbers)
+        nodes = np.union1d(part.nodes, axes.nodes)
+        self._axes = axes.at_nodes(nodes)
+        self._places = np.searchsorted(nodes, part.nodes)
+        self._reference_shear = axes_shear(self._axes.at(np.zeros((len(nodes), 3))))
+        self._lengths = net.node_lengths[part.nodes]
+        # Displacement, quaternion and contact force.
+        self._copies = Copies(disc.comm, disc.owned, disc.node_block[nodes], 8)
+
+    @cached_property
+    def _reference_directors(self) -> tuple[Array, Array, Array]:
+        disc = self._model.disc
+        nodal = disc.nodal_directions()
+        d1, d3 = (nodal[name][disc.part.nodes] for name in ("tangent", "normal"))
+        return d1, np.cross(d3, d1), d3
+
+    def own(self, time: float, outside: Mapping[str, Array]) -> Snapshot:
+        """The state of this rank's part, at the increment set last. Collective.
+
+        Args:
+            time: of it [s].
+            outside: as of ``Model.outside``.
+        """
+        model, disc = self._model, self._model.disc
+        u, q = disc.current()
+        pressure = np.zeros((disc.owned, 1))
+        for tool in model.tools:
+            pressure[:, 0] += np.linalg.norm(outside[tool.name][:, :3], axis=1)
+        around = self._copies(np.hstack([u[: disc.owned], q[: disc.owned], pressure]))
+        nodal = around[self._places]
+        forces = disc.in_order("cells", model.system.section_forces())
+        axes = self._axes.at(around[:, :3])
+        turn = moment = np.zeros(0)
+        if model.crossings is not None:
+            turn, moment = model.crossings.own_angles(), model.crossings.own_moments()
+        return Snapshot(
+            time=time,
+            displacement=nodal[:, :3],
+            directors=np.stack(
+                [rotate(nodal[:, 3:7], reference) for reference in self._reference_directors],
+                axis=1,
+            ),
+            section_forces=forces[:, :3],
+            section_moments=forces[:, 3:],
+            contact_pressure=nodal[:, 7] / self._lengths,
+            axes=axes,
+            shear_angle=axes_shear(axes) - self._reference_shear,
+            director_turn=turn,
+            crossing_moment=moment,
+        )
+
+    @cached_property
+    def _gathers(self) -> dict[Where, Gather]:
+        disc, part = self._model.disc, self._model.disc.part
+        numbers: dict[Where, npt.NDArray[np.int64]] = {
+            "nodes": part.nodes,
+            "cells": part.cell_numbers,
+            "crossings": part.crossing_numbers,
+        }
+        return {where: Gather(disc.comm, own) for where, own in numbers.items()}
+
+    def whole(self, own: Snapshot) -> Snapshot:
+        """The whole net's from those of all ranks' parts, on every rank. Collective."""
+        if self._model.comm.size == 1:
+            return own
+        arrays = {}
+        for name in (field.name for field in fields(Snapshot) if field.name in PLACES):
+            values = getattr(own, name)
+            width = int(np.prod(values.shape[1:]))
+            rows = self._gathers[PLACES[name]](values.reshape(len(values), width))
+            arrays[name] = rows.reshape(-1, *values.shape[1:])
+        return Snapshot(time=own.time, **arrays)
