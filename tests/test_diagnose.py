@@ -155,9 +155,9 @@ def test_the_unexplained_says_what_came_nearest(diagnosed, tmp_path):
 
 def test_what_is_left_of_nothing_is_in_no_model_of_several(tmp_path, monkeypatch):
     """An effect whose amplitude ends at nothing beside others: the model is that of the others."""
-    RECIPES["unlisted-wrinkles"](tmp_path / "set")
+    RECIPES["pair-crossover_friction-shear_locking"](tmp_path / "set")
     test = PictureFrame([read_measurement(tmp_path / "set")])
-    names = ("crosshead_backlash", "crossover_friction")
+    names = ("crosshead_backlash", "crossover_friction", "shear_locking")
     search = Search(test, [e for e in test.effects if e.name in names], lambda done, what: None)
     found, fitted = list[Model](), search._together
     monkeypatch.setattr(search, "_together", lambda *of: found.extend(fitted(*of)) or list(found))
