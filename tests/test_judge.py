@@ -17,6 +17,8 @@ from fabric_fenicsx.loop.inference.variances import Variances
 
 #: One sigma of a reading.
 SIGMA = 0.1
+#: Of a wave.
+WAVE = Parameter("wave", (), amplitude=True)
 
 
 def judged(acts_on="", since=0.5, stated=SIGMA, scatter=SIGMA):
@@ -54,6 +56,49 @@ def test_a_term_without_a_formula_has_to_be_known_where_it_foretells():
         # ... any function at all may not.
         judge, model = judged("moment", since)
         assert judge.foretells(model) is known
+
+
+@pytest.mark.parametrize("acts_on", ["", "moment"])
+def test_a_held_out_specimen_may_be_nearer_to_what_lacks_the_term(acts_on):
+    """By chance a soft specimen is met by a line that leaves out what all of them have."""
+    t = np.concatenate([np.linspace(0.0, 1.0, 80)] * 4 + [np.linspace(0.4, 0.8, 80)])
+    run = np.repeat(np.arange(5), 80)
+    wave = 0.1 * np.sin(2.0 * np.pi * (t - 0.35) / 1.0)
+    stiff = np.array([1.06, 0.95, 1.05, 0.94, 0.9])[run]
+    observed = stiff * t + wave + 0.01 * np.random.default_rng(3).normal(size=len(t))
+    data = readings(observed, run=run, holdout=(4,))
+    effect = Effect("wave", "linear", "", (Variant("only", (WAVE,)),), acts_on=acts_on)
+    test = Linear(data, {"b": t, "wave": wave}, ("b",), effects=[effect], noise=0.01)
+    judge = Judge(test, [effect])
+    # The noise of a model is what it leaves.
+    fits = [
+        fit(test, variants, start, data.fit, Variances(Noise(sigma), {"b": 0.06}))
+        for variants, start, sigma in (
+            ((), {"b": 1.0}, 0.07),
+            (effect.variants, {"b": 1.0, "wave": 1.0}, 0.01),
+        )
+    ]
+    baseline, model = (judge.weighed(f, e) for f, e in zip(fits, ((), (effect,)), strict=True))
+    assert judge.holdout(model.fit) > judge.holdout(baseline.fit)
+    assert judge.explains(model, baseline)
+    # What is held out, foretold as wrongly by a model that takes specimens to be alike, is not.
+    alike = fit(test, effect.variants, model.fit.values, data.fit, Variances(Noise(0.01)))
+    assert not judge.explains(judge.weighed(alike, (effect,)), baseline)
+
+
+def test_the_likelihood_of_what_is_foretold_is_that_of_all_readings_less_that_of_the_fitted():
+    judge, model = judged()
+    data, fitted = judge.experiment.readings, model.fit
+    J = np.column_stack([judge.experiment.columns[name] for name in fitted.values])
+
+    def likelihood(rows):
+        """With any parameters as likely as any others, but for what these go with."""
+        C = SIGMA**2 * np.eye(rows.sum()) + 1e6 * J[rows] @ J[rows].T
+        y = data.observed[rows]
+        return y @ np.linalg.solve(C, y) + np.linalg.slogdet(C)[1]
+
+    expected = likelihood(data.fit | data.holdout) - likelihood(data.fit)
+    assert fitted.predictive_likelihood(data.holdout) == pytest.approx(expected, abs=1e-2)
 
 
 def test_noise_beyond_what_was_stated():

@@ -118,15 +118,28 @@ class Fit:
         expected, white, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum of squares. NaN if there are
         none; infinite where what is expected, or its slope, is not a number.
         """
-        if not rows.any():
-            return float("nan")
+        left, _ = self._predicted(rows)
+        return float(np.sqrt(left / rows.sum())) if rows.any() else float("nan")
+
+    def predictive_likelihood(self, rows: Flags) -> float:
+        """−2 log of the density of the readings there, as they are predicted, but for n ln 2π.
+
+        What the parameters are not known by makes a prediction vague, which is paid for. Infinite
+        where what is expected, or its slope, is not a number.
+        """
+        left, determinant = self._predicted(rows)
+        return left + determinant
+
+    def _predicted(self, rows: Flags) -> tuple[float, float]:
+        """r · C⁻¹ r and ln det C of the readings there, C being what a prediction scatters by."""
         if not (np.isfinite(self.residual[rows]).all() and np.isfinite(self.slopes[rows]).all()):
-            return float("inf")
+            return float("inf"), 0.0
         whiten = self.variances.noise.whitener(self.readings, rows)
         r, G = whiten(self.residual[rows]), whiten(self.slopes[rows] @ self.root)
         along, size, _ = np.linalg.svd(G, full_matrices=False)
         allowed = float(np.sum((along.T @ r) ** 2 / (1.0 + 1.0 / np.maximum(size, 1e-150) ** 2)))
-        return float(np.sqrt(max(float(r @ r) - allowed, 0.0) / len(r)))
+        determinant = whiten.log_determinant + float(np.sum(np.log1p(size**2)))
+        return max(float(r @ r) - allowed, 0.0), determinant
 
     def prediction_std(self, rows: Flags, known: Sequence[str] = ()) -> float:
         """Standard error of the expected readings there, root mean square.

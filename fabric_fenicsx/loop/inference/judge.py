@@ -260,11 +260,13 @@ class Judge:
     def explains(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise, in what it was fitted to and in what it was not.
 
-        A term without a formula that makes holdout runs worse than without it explains nothing,
-        however little is known of it there.
+        A term without a formula explains nothing if holdout runs are less likely with it than
+        without, by what each says of them: that specimens differ, and how little it is known there.
         """
-        if self.held_rows.any() and not all(effect.listed for effect in model.effects):
-            if self.holdout(model.fit) >= self.holdout(baseline.fit):
+        out = self.held_rows
+        if out.any() and not all(effect.listed for effect in model.effects):
+            mine, other = (m.fit.predictive_likelihood(out) for m in (model, baseline))
+            if mine >= other:
                 return False
         return self.fits(model, baseline) and self.foretells(model)
 

@@ -61,7 +61,7 @@ MOST = 10
 MEMORIES = (0.01, 0.05, 0.2)
 
 SQUARES = ("recent_square_of_angle", "recent_square_of_rate")
-"""Of these those that a law is in proportion to, as what heat or a bed takes up is."""
+"""Of these what heat or a bed takes up: a product is in proportion to it."""
 
 FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate", *SQUARES)
 """Variables of a fading memory."""
@@ -178,7 +178,7 @@ def remembered_since(
 
 def wealth(base: str, variable: str) -> int:
     """How many of the splines, which are the more the less else there is to be found."""
-    if variable in ("unloading", *SQUARES):
+    if variable == "unloading":
         return 1
     if (base, variable) in FINE:
         return 5
