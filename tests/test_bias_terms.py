@@ -267,7 +267,7 @@ def test_damage_that_looks_like_friction_is_named(share):
     (pair,) = ((name, *rivals) for name, rivals in named.items())
     assert {"crossover_friction", "elastic_moment_of_largest_angle"} <= {*pair}
     told = [t for t in report["next_tests"] if "crossover_friction" in t["effects"]]
-    # A separation is in units of the noise: what is 3 at the smaller one is half of it at the other.
+    # A separation is in units of the noise: twice as large at half of it.
     assert told[0]["separation"] * share > 3.0 * 0.015 and "unload" in told[0]["do"]
 
 

@@ -17,6 +17,7 @@ from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.cantilever import CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
+from fabric_fenicsx.loop.kinds.cantilever.terms import terms
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.loop.own_effects import read_effects
 from fabric_fenicsx.loop.report.discovered import Discovered, _shape_table
@@ -402,3 +403,25 @@ def test_a_strip_that_is_handled_changes_from_run_to_run(term, made):
         assert variant.shape.reach == 4.0
         bend = float(as_ufl(variant.shape.value({f"{term}_0": 0.0, f"{term}_1": 1.0}, 1.0)))
         assert last * bend == pytest.approx(4e-4, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("overhangs", "labels"),
+    [
+        (3, ["linear"]),
+        (4, ["linear", "2 coefficients"]),
+        (5, ["linear", "2 coefficients", "step"]),
+    ],
+)
+def test_what_goes_by_the_overhang_has_no_more_shapes_than_overhangs_tell(overhangs, labels):
+    ranges = {"length": 200.0, "curvature": 0.01, "x": 100.0, "z": 90.0, "overhangs": overhangs}
+    found = {term.name: term for term in terms(ranges, ())}
+    for name in ("rest_curvature_of_length", "load_of_length"):
+        assert [form.label for form in found[name].variants] == labels
+    last = found["rest_curvature_of_length"].variants[-1]
+    assert len(last.parameters) <= overhangs
+    if overhangs > 4:
+        own = {"0": -0.5, "1": 1.0, "place": 0.6, "width": 0.02}
+        values = {f"rest_curvature_of_length_{key}": value for key, value in own.items()}
+        added = [float(last.added_curvature(values, {"length": at})) for at in (60.0, 120.0, 180.0)]
+        assert added == pytest.approx([-0.005, 0.0, 0.005], abs=1e-6)

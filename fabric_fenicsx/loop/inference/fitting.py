@@ -131,7 +131,7 @@ class Fit:
         return left + determinant
 
     def _predicted(self, rows: Flags) -> tuple[float, float]:
-        """r · C⁻¹ r and ln det C of the readings there, C being what a prediction scatters by."""
+        """For the readings there r · C⁻¹ r and ln det C, C being what a prediction scatters by."""
         if not (np.isfinite(self.residual[rows]).all() and np.isfinite(self.slopes[rows]).all()):
             return float("inf"), 0.0
         whiten = self.variances.noise.whitener(self.readings, rows)

@@ -174,6 +174,7 @@ class Cantilever:
             "z": float(np.abs(self._observed[rows]).max()),
             "stiffness_per_C1": self.stiffness_per_C1,
             "runs": last_run(self._before, np.unique(self._run[rows])),
+            "overhangs": float(len(np.unique(self._length[rows]))),
         }
         return terms(ranges, np.unique(self._run[rows]).tolist())
 

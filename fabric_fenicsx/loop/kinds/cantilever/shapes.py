@@ -25,6 +25,7 @@ __all__ = [
     "along_the_strip",
     "by_turns",
     "coefficient",
+    "over_overhangs",
     "over_runs",
     "places",
     "splines",
@@ -39,6 +40,8 @@ STEPS, BUMPS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 WIDTH, BUMP_WIDTHS = 0.03, (0.03, 0.1)
 #: Decays from the clamp or from the free end, as shares of it.
 DECAYS = (0.05, 0.2)
+#: Different overhangs from which on what goes by them may bend, or change at one of them.
+FEWEST_TO_BEND, FEWEST_TO_CHANGE = 4, 5
 #: Over how many runs something settles, as a share of them.
 FADING = (0.3, 1.0)
 #: No coefficient is larger: a moment or a weight that is so many times another is none. But a
@@ -81,6 +84,15 @@ def along_the_strip(
         # Nothing much bends there: a place of its own would hardly be known.
         return
     yield from places(name)
+
+
+def over_overhangs(name: str, count: float, *, constant: bool = False) -> Iterator[Drawn]:
+    """Shapes over the few overhangs that there are, so many of them."""
+    yield from splines(name, SPLINES[: 1 + (count >= FEWEST_TO_BEND)], constant=constant)
+    if count >= FEWEST_TO_CHANGE:
+        label, own, step = next(places(name))
+        zero = (coefficient(f"{name}_0"),) if constant else ()
+        yield label, (*zero, *own), lambda p, x: sum(p[c.name] for c in zero) + step(p, x)
 
 
 def places(name: str, sharpest: float = 0.01) -> Iterator[Drawn]:

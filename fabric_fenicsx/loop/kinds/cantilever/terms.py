@@ -37,6 +37,7 @@ from .shapes import (
     Of,
     along_the_strip,
     coefficient,
+    over_overhangs,
     over_runs,
     places,
     splines,
@@ -78,7 +79,8 @@ def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
     Args:
         ranges: largest value in the fitted readings of "length", "x", "z" [mm] and of the
             baseline's "curvature" [1/mm]; the "stiffness_per_C1" of the strips [mm³]; how many
-            "runs" of its specimen were before one: with less than two there are no terms by them.
+            "runs" of its specimen were before one: with less than two there are no terms by them;
+            how many different "overhangs" there are.
         runs: that are fitted, counted from 0.
     """
     found = [
@@ -204,7 +206,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         name = f"{acts_on}_of_length"
         forms = [
             form_of_strip(drawn, acts_on, unit, "length", longest)
-            for drawn in splines(name, SPLINES[:1], constant=constant)
+            for drawn in over_overhangs(name, ranges.get("overhangs", 0.0), constant=constant)
         ]
         yield strip_effect(name, f"{about} that goes by the overhang", acts_on, ("length",), forms)
 
@@ -304,7 +306,8 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     name = "reading_of_length"
     forms = [form(*shape, "length", "scale") for shape in splines(name, SPLINES)]
     # Nobody knows where a camera that moves with the overhang has its zero.
-    forms += [form(*shape, "length", "height") for shape in splines(name, SPLINES, constant=True)]
+    by_overhang = over_overhangs(name, ranges.get("overhangs", 0.0), constant=True)
+    forms += [form(*shape, "length", "height") for shape in by_overhang]
     yield strip_effect(
         name, "heights, or their scale, by the overhang", "reading", ("length",), forms
     )
