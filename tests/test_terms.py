@@ -97,6 +97,7 @@ def test_memories_fade():
         ("graded", (0.3, -1.0, 2.0, 0.7, -3.0, 1.0), {}),
         ("step", (0.7,), {"place": 0.4, "width": 0.05}),
         ("saturation", (0.7,), {"width": 0.2}),
+        ("hyperbola", (0.7,), {"width": 0.05}),
         ("logarithm", (0.7,), {"width": 0.05}),
         ("periodic", (0.4, -0.6), {"width": 0.3}),
         ("periodic", (0.4, -0.6, 0.2, 0.1), {"width": 0.3}),

@@ -62,7 +62,9 @@ class Criteria:
         combinations: of effects that are fitted, of all that are compared to first order; made-up.
         terms: that are fitted by themselves, of all effects and terms without a formula that are
             compared to first order; convention.
-        products: terms over two variables that are fitted by themselves; convention.
+        products: terms over two variables that are fitted in all forms, and further ones over a
+            single one, where more is looked for; convention.
+        glimpsed: of which one form is fitted to find those; convention.
         most_terms: in one model, terms without a formula among them; convention.
         as_little, without_formula: error over that of a term without a formula up to which
             another term is its rival if it loses by so many times ``decisive``; convention.
@@ -111,6 +113,7 @@ class Criteria:
     combinations: int = 6
     terms: int = 8
     products: int = 3
+    glimpsed: int = 16
     most_terms: int = 2
     as_little: float = 1.02
     without_formula: float = 3.0

@@ -176,6 +176,7 @@ class Search:
             self._with_one_less(levels)
             if self._screened_first and levels[-1]:
                 self._with_another(levels, fewer)
+                self._in_other_forms(levels)
             # With an effect of which nothing is left it is a model of fewer, which is among those.
             levels[-1] = [m for m in levels[-1] if not nothing_left(m.fit)]
         return candidates, [level for level in levels if level]
@@ -204,8 +205,11 @@ class Search:
         # Sizes of fits that allow for specimens and of those that do not are not compared.
         singles = self.models.weighed(found) + self.models.weighed(alike)
         levels.append(self.models.best_refined(singles))
-        best = _nearest(levels)
-        if self._of_two and not self._settled(best, levels[0][0]):
+        if self._screened_first and not self._settled(_nearest(levels), levels[0][0]):
+            ranked = screen.most_promising(CRITERIA.terms + CRITERIA.glimpsed)
+            later = self._after_a_glimpse(screen, self._signatures, ranked[CRITERIA.terms :])
+            levels[1] = sorted([*levels[1], *later], key=lambda m: m.criterion)
+        if self._of_two and not self._settled(_nearest(levels), levels[0][0]):
             of_two = self._over_two_variables(candidates)
             levels[1] = sorted([*levels[1], *of_two], key=lambda m: m.criterion)
         for candidate in candidates:
@@ -222,11 +226,25 @@ class Search:
         """Models of the most promising terms over two variables, which join the candidates."""
         signs = self._signed(self._of_two)
         screen = self._screen(signs)
-        tried = screen.most_promising(CRITERIA.products)
+        found = self._after_a_glimpse(screen, signs, screen.most_promising(CRITERIA.glimpsed))
+        tried = list(dict.fromkeys(model.effects[0] for model in found))
         scores = screen.scores(tried)
         candidates += [Candidate(e, *score) for e, score in zip(tried, scores, strict=True)]
+        return found
+
+    def _after_a_glimpse(
+        self, screen: Screen, signs: Signatures, ranked: Sequence[Effect]
+    ) -> list[Model]:
+        """Models of those effects of which one form, fitted, leaves least; in all their forms.
+
+        To first order an effect that changes much is misjudged: a few steps say more.
+        """
+        left: dict[Effect, float] = {}
+        for effect in ranked:
+            for model in self.models.fitted([screen.best_form(effect)], starts=1):
+                left[effect] = model.size(CRITERIA.far) + self.judge.cost(model, (effect,))
         found: list[Fit] = []
-        for effect in tried:
+        for effect in sorted(left, key=lambda one: left[one])[: CRITERIA.products]:
             found += self.models.fitted(_by_itself(signs[effect]), starts=1)
         return self.models.best_refined(self.models.weighed(found))
 
@@ -254,12 +272,17 @@ class Search:
         Those over two variables as well, of which no two are looked at together. Where a model is
         far from linear, what lacks beside it is not seen about the baseline.
         """
-        present, known = self.models.effects_of(model), set(model.values)
+        present = self.models.effects_of(model)
+        others = [e for e in (*self.effects, *self._of_two) if e not in present]
+        return self._beside(model, others)
+
+    def _beside(self, model: Fit, effects: Sequence[Effect]) -> list[Combination]:
+        """Every form of some effects, about a model."""
+        known = set(model.values)
         alike, _ = self.experiment.predict(model.variants, model.values)
         return [
             ((variant, shape),)
-            for effect in (*self.effects, *self._of_two)
-            if effect not in present
+            for effect in effects
             for variant in effect.variants
             if known.isdisjoint(p.name for p in variant.parameters)
             for shape in signatures(self.experiment, model, alike, variant)
@@ -314,6 +337,28 @@ class Search:
                 base = self.models.with_these_variances(model)
                 more = self._added_to(base)
                 found += self.models.fitted(more, starts=1, base=base, most=CRITERIA.terms)
+        if found:
+            levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
+
+    def _in_other_forms(self, levels: list[list[Model]]) -> None:
+        """The best model of the last level with each of its effects in each of its forms.
+
+        The form that does best by itself stands for what the others do as well.
+        """
+        best = levels[-1][0]
+        if self.judge.settled(best, levels[0][0]):
+            return
+        found: list[Fit] = []
+        for effect in best.effects:
+            kept = tuple(v for v in best.fit.variants if v not in effect.variants)
+            try:
+                base = fit(
+                    self.experiment, kept, best.fit.values, best.fit.used, self.models.variances
+                )
+            except SolveError:
+                continue
+            own = self._beside(base, [effect])
+            found += self.models.fitted(own, starts=1, base=base)
         if found:
             levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
 

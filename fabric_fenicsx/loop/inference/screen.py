@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, product
 
 import numpy as np
@@ -120,12 +121,28 @@ class Screen:
 
     def most_promising(self, count: int) -> list[Effect]:
         """Effects by what their best form takes off the sum of squares, less what it costs."""
-        gains = self._gains([(g,) for g in self._groups])
-        worth: dict[Effect, float] = {}
-        for group, gain in zip(self._groups, gains, strict=True):
-            net = float(gain) - np.log(self._count) * group.parameters
-            worth[group.effect] = max(worth.get(group.effect, -np.inf), net)
+        worth = {effect: self._worth[group] for effect, group in self._best_of_each.items()}
         return sorted(worth, key=lambda effect: worth[effect], reverse=True)[:count]
+
+    def best_form(self, effect: Effect) -> Combination:
+        """The form of an effect by which it is ranked, in its best shape."""
+        group = self._groups[self._best_of_each[effect]]
+        return ((group.variant, group.signature),)
+
+    @cached_property
+    def _worth(self) -> Array:
+        """What each shape takes off, less what it costs."""
+        gains = self._gains([(g,) for g in self._groups])
+        return gains - np.log(self._count) * np.array([g.parameters for g in self._groups])
+
+    @cached_property
+    def _best_of_each(self) -> dict[Effect, int]:
+        """Of each effect the number of its best shape."""
+        found: dict[Effect, int] = {}
+        for k, group in enumerate(self._groups):
+            if group.effect not in found or self._worth[k] > self._worth[found[group.effect]]:
+                found[group.effect] = k
+        return found
 
     def best(self, count: int, effects: int) -> list[Combination]:
         """The most promising sets of effects, each in up to three combinations of their forms.

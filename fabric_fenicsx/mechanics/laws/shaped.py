@@ -30,7 +30,9 @@ Variable = Literal[
     "recent_square_of_rate",
 ]
 AtHand = Literal["angle", "rate"]
-Kind = Literal["spline", "graded", "step", "saturation", "logarithm", "periodic", "bump"]
+Kind = Literal[
+    "spline", "graded", "step", "saturation", "hyperbola", "logarithm", "periodic", "bump"
+]
 Base = Literal[
     "elastic",
     "rest",
@@ -156,8 +158,9 @@ def shape_of(
         kind: "spline", a C¹ quadratic one with as many equal pieces less one as coefficients,
             Σ c_k x^k for the first two, then c_k (x − t_k)₊², of a knot below 0 c_k (t_k − x)₊²;
             "graded", one with the knots GRADED, for what bends at the beginning; "step",
-            c / (1 + exp(−(x − x₀)/w)); "saturation", c (1 − exp(−x/w)); "logarithm",
-            c ln(1 + x/w); "periodic", c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1), and overtones;
+            c / (1 + exp(−(x − x₀)/w)); "saturation", c (1 − exp(−x/w)); "hyperbola",
+            c x / (|x| + w); "logarithm", c ln(1 + x/w); "periodic",
+            c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1), and overtones;
             "bump", (c₁ + c₂ y) e^(−y²) with y = (x − x₀)/w, less what that is at 0;
             "sign", c tanh(x/w); "sides", c₁ x + c₂ |x|, each side of 0 with a slope of its own.
         coefficients: c or c_k.
@@ -174,6 +177,8 @@ def shape_of(
         return c[0] * (1 / (1 + exp(-(x - place) / width)) - start)
     if kind == "saturation":
         return c[0] * (1 - exp(-x / width))
+    if kind == "hyperbola":
+        return c[0] * x / (size_of(x) + width)
     if kind == "logarithm":
         return c[0] * ln(1 + x / width)
     if kind == "periodic":

@@ -360,9 +360,9 @@ def _added(
     """Label and numbers of shapes."""
     one = (Parameter(f"{name}_1", amplitude=True),)
     if variable == "speed_size":
-        for label, coefficients, numbers in shapes(name, 2):
-            # A friction that falls with the speed, or grows; lines are among the others.
-            if label in ("step", "saturation"):
+        for label, coefficients, numbers in shapes(name, 4):
+            # A friction that falls with the speed, or grows; what is less bent is among the others.
+            if label not in ("linear", "2 coefficients", "logarithm"):
                 also = {"coefficients": coefficients} | _zero(name, turning)
                 yield f"friction, {label}", numbers | also
         return

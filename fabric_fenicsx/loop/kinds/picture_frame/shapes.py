@@ -51,7 +51,7 @@ PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
 BUMPS, BUMP_WIDTHS = tuple((0.05 + 0.1 * np.arange(10)).tolist()), (0.03, 0.12)
 #: Decays, as shares of the range.
 DECAYS = (0.1, 0.3)
-#: Where a logarithm bends over, as shares of it.
+#: Where a logarithm bends over, or a hyperbola is half of what it ends at, as shares of it.
 BENDS = (0.01, 0.1)
 #: Steps of how many cycles a wave is looked for with: closer together two are alike.
 STEP = 0.5
@@ -180,6 +180,9 @@ def wealth(base: str, variable: str) -> int:
     """How many of the splines, which are the more the less else there is to be found."""
     if variable == "unloading":
         return 1
+    if variable in SQUARES:
+        # Small ones and large ones are far apart.
+        return 4
     if (base, variable) in FINE:
         return 5
     return 3 if variable in (*FORGETFUL, "recent_force", "mean_speed") else 4
@@ -207,6 +210,8 @@ def shapes(name: str, wealth: int) -> Iterator[Drawn]:
         yield "graded", own, {"shape": "graded"}
         bend = Parameter(f"{name}_bend", BENDS, 1e-3, 1.0)
         yield "logarithm", one, {"shape": "logarithm", "width": bend}
+        half = Parameter(f"{name}_half", BENDS, 1e-3, 1.0)
+        yield "hyperbola", one, {"shape": "hyperbola", "width": half}
 
 
 def waves(name: str, most: float, overtones: Sequence[int] = (0,)) -> Iterator[Drawn]:
