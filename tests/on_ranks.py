@@ -33,7 +33,7 @@ def tangent_norm(comm, *, crossings=True):
     model = small_model(comm)
     disc, system = model.disc, model.system
     rng = np.random.default_rng(5)
-    n = len(model.net.points)
+    n = model.net.sizes["nodes"]
     u, q, w = rng.normal(size=(n, 3)), np.ones((n, 4)), 0.1 * rng.normal(size=(n, 6))
     q[:, 1:] = 0.2 * rng.normal(size=(n, 3))
     set_state(model, 0.3 * u, q / np.linalg.norm(q, axis=1)[:, None])
@@ -52,7 +52,7 @@ def tangent_norm(comm, *, crossings=True):
 def pulled_at_corners(model, *forces):
     """Statics of a net after three steps to a force at the end of its first and its last warp."""
     statics = Statics(model, force_tolerance=1e-10)
-    top = model.net.ends[model.net.tow_family == 0, 1]
+    top = model.net.numbers["nodes"][model.net.ends[model.net.tow_family == 0, 1]]
 
     def load(part):
         for node, force in zip((top[0], top[-1]), forces, strict=True):

@@ -24,6 +24,7 @@ from fabric_fenicsx.rigs.drape import DrapeCase
 from fabric_fenicsx.solving import direct, remainder, tangent
 from fabric_fenicsx.solving.blocks import BLOCK
 from fabric_fenicsx.solving.discretisation import Discretisation
+from fabric_fenicsx.solving.partition import handed_out
 from fabric_fenicsx.solving.remainder import ByFronts, ByMumps
 from fabric_fenicsx.solving.tangent import Condensed, OfComponents, Whole, tangent_of
 
@@ -52,14 +53,18 @@ class Blocks:
     def __init__(self, net, *, symmetric, added=(), comm=MPI.COMM_WORLD):
         ones = np.ones(len(net.cells))[:, None]
         stiffness, mass = ones * SECTION.stiffness(), ones * SECTION.mass()
-        self.net = Discretisation(net, stiffness, mass, comm)
+        part = handed_out(net, comm)
+        own = part.cell_numbers
+        self.net = Discretisation(part, stiffness[own], mass[own], comm)
         self.symmetric, self.added, self.size = symmetric, dict(added), 1.0
 
     def tangent(self, A):
         disc = self.net
         A.zeroEntries()
         whole = A.getComm().size == disc.comm.size
-        node_of = np.argsort(disc.node_block)[disc.own_blocks]
+        order = np.argsort(disc.node_block)
+        at = order[np.searchsorted(disc.node_block, disc.own_blocks, sorter=order)]
+        node_of = disc.net.nodes[at]
         for pair in disc.own_pairs:
             rows = (disc.own_blocks[pair] if whole else pair).astype(PETSc.IntType)
             seed = node_of[pair]
@@ -69,17 +74,27 @@ class Blocks:
                 K += np.triu(G)
             A.setValuesBlocked(rows, rows, self.size * K, addv=PETSc.InsertMode.ADD_VALUES)
         for node, block in self.added.items():
-            at = disc.node_block[node] - disc.own_blocks[0]
-            if 0 <= at < disc.owned:
+            for at in np.flatnonzero(disc.local_nodes[: disc.owned] == node):
                 row = np.array([disc.own_blocks[at] if whole else at], dtype=PETSc.IntType)
                 A.setValuesBlocked(row, row, block, addv=PETSc.InsertMode.ADD_VALUES)
         A.assemble()
 
 
+def diagonal_block(system, node):
+    """That of a node in the whole matrix, on every rank."""
+    disc, own = system.net, np.zeros((BLOCK, BLOCK))
+    A = disc.matrix()
+    system.tangent(A)
+    for at in np.flatnonzero(disc.local_nodes[: disc.owned] == node):
+        row = (disc.own_blocks[at] * BLOCK + np.arange(BLOCK)).astype(PETSc.IntType)
+        own = A.getValues(row, row)
+    return disc.comm.allreduce(own)
+
+
 def right_hand_side(disc):
     """A random one, the same on however many ranks."""
     b = disc.vector()
-    values = np.random.default_rng(3).normal(size=(len(disc.net.points), BLOCK))
+    values = np.random.default_rng(3).normal(size=(disc.net.sizes["nodes"], BLOCK))
     b.array[:] = values[disc.local_nodes[: disc.owned]].ravel()
     return b
 
@@ -153,15 +168,7 @@ def test_symmetric_matrices_are_factorised_by_fronts(share):
     """Crossings' blocks are K + share K; some lie on the ranks' edges."""
     net = plain_net(3, 4, 4.0, 4)
     plain = Blocks(net, symmetric=True)
-    A = plain.net.matrix()
-    plain.tangent(A)
-    added = {}
-    for node in net.crossings[:, 0]:
-        row = (plain.net.node_block[node] * BLOCK + np.arange(BLOCK)).astype(PETSc.IntType)
-        own = np.zeros((BLOCK, BLOCK))
-        if A.getOwnershipRange()[0] <= row[0] < A.getOwnershipRange()[1]:
-            own = A.getValues(row, row)
-        added[int(node)] = share * plain.net.comm.allreduce(own)
+    added = {int(node): share * diagonal_block(plain, node) for node in net.crossings[:, 0]}
     condensed, found = both(Blocks(net, symmetric=True, added=added))
     check(found, 1e-9)
     assert isinstance(condensed._solver, ByFronts)
@@ -249,17 +256,10 @@ def test_a_chain_without_stable_pivots_stays(symmetric, share, refused):
     """
     net = plain_net(3, 4, 4.0, 4)
     node = 5
-    plain = Blocks(net, symmetric=symmetric)
-    A = plain.net.matrix()
-    plain.tangent(A)
-    row = plain.net.node_block[node] * BLOCK + np.arange(BLOCK)
-    own = np.zeros((BLOCK, BLOCK))
-    if A.getOwnershipRange()[0] <= row[0] < A.getOwnershipRange()[1]:
-        own = A.getValues(row.astype(PETSc.IntType), row.astype(PETSc.IntType))
-    block = plain.net.comm.allreduce(own)
+    block = diagonal_block(Blocks(net, symmetric=symmetric), node)
     condensed, found = both(Blocks(net, symmetric=symmetric, added={node: share * block}))
     check(found, 1e-9)
-    if plain.net.comm.size == 1:
+    if MPI.COMM_WORLD.size == 1:
         assert set(np.flatnonzero(condensed.refused)) == (set(range(4, 9)) if refused else set())
         left = 2 * 12 + 2 * 7 + (3 if refused else 0)
         assert condensed.unknowns == BLOCK * left

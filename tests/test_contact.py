@@ -46,7 +46,7 @@ def pressed_on_a_plate(*, held=False, overlap=OVERLAP):
 
 def push(model, per_length):
     """Push downwards by a force per tow length [N/mm]."""
-    own = model.disc.local_nodes[: model.disc.owned]
+    own = model.disc.places[: model.disc.owned]
     model.system.nodal_loads[: len(own), 2] = -per_length * model.net.node_lengths[own]
 
 

@@ -19,12 +19,13 @@ from fabric_fenicsx.fabric.axes import TowAxes
 from fabric_fenicsx.fabric.part import Part
 from fabric_fenicsx.output.paraview import TimeSeries
 from fabric_fenicsx.output.steps import StepFile, remove_step, remove_torn, step_path, write_step
-from fabric_fenicsx.solving.exchange import Copies, Gather
+from fabric_fenicsx.solving.exchange import Copies, Gather, Table
 from fabric_fenicsx.solving.partition import partition
 from fabric_fenicsx.solving.seen import PLACES
 from fabric_fenicsx.solving.snapshot import Snapshot, at_rest
 
 NET = plain_net(5, 6, 4.0, 2)
+WHOLE = Part.all_of(NET)
 NONE = np.zeros(0, dtype=np.int64)
 PUNCH = {"punch": np.array([1.0, 2.0, 3.0])}
 
@@ -34,22 +35,14 @@ def parts(count):
     own = partition(NET, count - 1)
     crossings = np.arange(len(NET.crossings)) % (count - 1)
     return [
-        Part.of(NET, np.flatnonzero(own == k), np.flatnonzero(crossings == k), NONE)
+        WHOLE.cut(np.flatnonzero(own == k), np.flatnonzero(crossings == k), NONE)
         for k in range(count)
     ]
 
 
-def numbers(part):
-    return {
-        "nodes": part.nodes,
-        "cells": part.cell_numbers,
-        "crossings": part.crossing_numbers,
-    }
-
-
 def seen_by(part, snapshot):
     """What of a snapshot belongs to a part."""
-    own = numbers(part)
+    own = part.numbers
     return replace(
         snapshot, **{name: getattr(snapshot, name)[own[PLACES[name]]] for name in PLACES}
     )
@@ -67,9 +60,10 @@ def test_a_part_is_a_net_of_its_own():
             part.nodes[part.crossings], NET.crossings[part.crossing_numbers]
         )
         np.testing.assert_array_equal(part.cell_tow, NET.cell_tow[part.cell_numbers])
-    whole = Part.of(NET, np.arange(len(NET.cells)), np.arange(len(NET.crossings)), NONE)
-    for name in ("points", "cells", "crossings", "cell_tow"):
-        np.testing.assert_array_equal(getattr(whole, name), getattr(NET, name))
+    again = WHOLE.cut(np.arange(len(NET.cells)), np.arange(len(NET.crossings)), NONE)
+    for name in ("points", "cells", "crossings", "cell_tow", "ends", "normals"):
+        for whole in (WHOLE, again):
+            np.testing.assert_array_equal(getattr(whole, name), getattr(NET, name))
 
 
 def test_directions_of_some_crossings_are_those_of_the_net():
@@ -176,7 +170,7 @@ def step_of(folder, own, number=1, wait=lambda: None):
     path = step_path(folder, number)
     for rank, part in reversed(list(enumerate(own))):
         before = [other.nodes for other in own[:rank]]
-        owned = numbers(part) | {"nodes": np.setdiff1d(part.nodes, np.concatenate([NONE, *before]))}
+        owned = part.numbers | {"nodes": np.setdiff1d(part.nodes, np.concatenate([NONE, *before]))}
         rows = {
             where: {f"of {where}": np.column_stack([n, 10.0 * n]), f"more of {where}": -n}
             for where, n in owned.items()
@@ -188,8 +182,7 @@ def step_of(folder, own, number=1, wait=lambda: None):
 
 @pytest.mark.parametrize("count", [1, 4])
 def test_rows_of_a_step_are_found_whoever_wrote_them(tmp_path, count):
-    whole = Part.of(NET, np.arange(len(NET.cells)), np.arange(len(NET.crossings)), NONE)
-    path = step_of(tmp_path, [whole] if count == 1 else parts(count))
+    path = step_of(tmp_path, [WHOLE] if count == 1 else parts(count))
     sizes = {"nodes": NET.points, "cells": NET.cells, "crossings": NET.crossings}
     with StepFile(path) as file:
         assert float(file["time"]) == 0.5
@@ -227,11 +220,15 @@ def test_rows_travel_between_ranks():
     """Copies at any nodes and gathered rows are those of the net; also a number that all have."""
     comm = MPI.COMM_WORLD
     model = small_model(comm)
-    disc, points = model.disc, model.net.points
-    nodes = np.random.default_rng(comm.rank).permutation(len(points))[:7]
+    disc, points = model.disc, plain_net(3, 4, 4.0, 2).points
+    np.testing.assert_array_equal(model.net.points, points[model.net.nodes])
     own = points[disc.numbers["nodes"]]
-    found = Copies(comm, disc.owned, disc.node_block[nodes], 3)(own)
-    np.testing.assert_array_equal(found, points[nodes])
+    found = Copies(comm, disc.owned, disc.node_block, 3)(own)
+    np.testing.assert_array_equal(found, model.net.points)
+    nodes = np.random.default_rng(comm.rank).permutation(len(points))[:7]
+    table = Table(comm, len(points), disc.numbers["nodes"], own)
+    np.testing.assert_array_equal(table.at(nodes), points[nodes])
+    assert len(table.share) <= len(points) // comm.size + 1
     part = disc.part
     gather = Gather(comm, part.nodes)
     np.testing.assert_array_equal(gather(part.points), points)

@@ -117,7 +117,7 @@ def test_tangent_with_a_free_height():
     disc, system = model.disc, model.system
     model.set_time(0.0, 1.0)
     rng = np.random.default_rng(3)
-    nodes = len(disc.net.points) * 6
+    nodes = disc.net.sizes["nodes"] * 6
     w, h = rng.normal(size=(2, nodes)) * np.tile([1e-2] * 3 + [1e-3] * 3, nodes // 6)
     # Deep enough that the edges of the holes touch.
     w[2::6] -= 0.3

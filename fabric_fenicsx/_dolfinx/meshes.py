@@ -44,31 +44,29 @@ def interval_mesh(
     cells: npt.NDArray[np.int64],
     owners: npt.NDArray[np.int64] | None = None,
 ) -> Any:
-    """A mesh of two-node intervals, every one of them given on rank 0.
+    """A mesh of two-node intervals, of which each rank gives a part.
 
     Args:
-        comm: the communicator to distribute it on.
-        points: node positions, shape (n_nodes, gdim); read on rank 0 only.
-        cells: node numbers, shape (n_cells, 2); read on rank 0 only.
-        owners: rank of each cell, shape (n_cells,); read on rank 0 only. By default rank 0.
+        comm: the communicator it is distributed on.
+        points: positions of nodes, shape (n, gdim), those of the ranks one after the other.
+        cells: node numbers among the points of all ranks, of this rank's cells and of those of
+            others that share a node with them, shape (n_cells, 2).
+        owners: rank of each of these cells, shape (n_cells,). By default all are this rank's.
 
     Returns:
         The dolfinx mesh. Facets that two ranks share are ghosted, or an interior node would
         look like a tow end.
     """
     gdim = points.shape[1]
-    if comm.rank != 0:
-        points = np.zeros((0, gdim))
-        cells = np.zeros((0, 2), dtype=np.int64)
-    if owners is None or comm.rank != 0:
-        owners = np.zeros(len(cells), dtype=np.int64)
-    # Of whichever arguments this version hands over: each rank's cells are those above.
-    destinations = _with_ghosts(cells, owners)
+    if owners is None:
+        owners = np.full(len(cells), comm.rank)
+    # Of whichever arguments this version hands over: each rank's cells are those below.
+    destinations = _with_ghosts(cells, owners, comm.rank)
 
     def partitioner(*_: Any) -> Any:
         return dolfinx.cpp.graph.AdjacencyList_int32(*destinations)
 
-    cells = np.ascontiguousarray(cells, dtype=np.int64)
+    cells = np.ascontiguousarray(cells[owners == comm.rank], dtype=np.int64)
     points = np.ascontiguousarray(points, dtype=np.float64)
     if _BASIX_UFL:
         element = basix.ufl.element("Lagrange", "interval", 1, shape=(gdim,))
@@ -92,23 +90,23 @@ def interval_mesh(
 
 
 def _with_ghosts(
-    cells: npt.NDArray[np.int64], owners: npt.NDArray[np.int64]
+    cells: npt.NDArray[np.int64], owners: npt.NDArray[np.int64], rank: int
 ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
-    """Ranks that need each cell, its owner first, and where those of each cell begin.
+    """Ranks that need each cell of one, its owner first, and where those of each cell begin.
 
     A rank needs its own cells and those that share a node with them.
     """
-    count = len(cells)
     order = np.argsort(cells.ravel(), kind="stable")
     nodes, cell = cells.ravel()[order], order // 2
     meet = np.flatnonzero(nodes[1:] == nodes[:-1])
     at = np.concatenate([cell[meet], cell[meet + 1]])
     needing = owners[np.concatenate([cell[meet + 1], cell[meet]])]
-    foreign = needing != owners[at]
+    foreign = (needing != owners[at]) & (owners[at] == rank)
     ghosts = np.unique(np.column_stack([at[foreign], needing[foreign]]), axis=0)
-    at = np.concatenate([np.arange(count), ghosts[:, 0]])
-    ranks = np.concatenate([owners, ghosts[:, 1]])[np.argsort(at, kind="stable")]
-    begins = np.concatenate([[0], np.cumsum(np.bincount(at, minlength=count))])
+    own = np.flatnonzero(owners == rank)
+    at = np.concatenate([np.arange(len(own)), np.searchsorted(own, ghosts[:, 0])])
+    ranks = np.concatenate([owners[own], ghosts[:, 1]])[np.argsort(at, kind="stable")]
+    begins = np.concatenate([[0], np.cumsum(np.bincount(at, minlength=len(own)))])
     return ranks.astype(np.int32), begins.astype(np.int32)
 
 
@@ -183,7 +181,10 @@ def input_nodes(mesh: Any) -> npt.NDArray[np.int64]:
 
 
 def input_cells(mesh: Any) -> npt.NDArray[np.int64]:
-    """Cell number, as given to interval_mesh, of each local cell, shape (n_local_cells,)."""
+    """Number of each local cell among those that interval_mesh was given, (n_local_cells,).
+
+    The ranks' own cells count one after the other.
+    """
     topology = mesh.topology
     original = topology.original_cell_index
     return np.asarray(original, dtype=np.int64)[: local_cells(mesh)]

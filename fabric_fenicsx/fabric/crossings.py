@@ -34,8 +34,11 @@ def tow_numbers(net: Net) -> Integers:
 
     Tows count along those of the other family: two that a tow crosses one after the other have
     numbers in sequence, on a sheet of any shape. Pieces of one tow, which a notch of the outline
-    parts, share their number.
+    parts, share their number. A part of a net has been told those of the whole.
     """
+    told: Integers | None = getattr(net, "tow_numbers", None)
+    if told is not None:
+        return told
     numbers = np.zeros(len(net.tow_family), dtype=np.int64)
     tow = node_tows(net)
     for family in (WARP, WEFT):

@@ -7,20 +7,24 @@ parallel, a vertex that more than two cells share.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["WARP", "WEFT", "Net", "single_tow"]
+__all__ = ["WARP", "WEFT", "Net", "Where", "single_tow"]
 
 WARP, WEFT = 0, 1
+
+Where = Literal["nodes", "cells", "crossings"]
+"""What of a net values belong to."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Net:
-    """Tows and crossings. Every rank holds the whole of it; node numbers are the net's own.
+    """Tows and crossings; node numbers are the net's own.
 
     Attributes:
         points: node positions [mm], shape (n_nodes, 3).
@@ -71,6 +75,20 @@ class Net:
         out_of_plane = np.einsum("ij,ij->i", self.normals, self.tangents)
         if np.abs(out_of_plane).max() > 1e-6:
             raise ValueError("net: a sheet normal is not perpendicular to its tow")
+
+    @property
+    def numbers(self) -> dict[Where, npt.NDArray[np.int64]]:
+        """Numbers of its nodes, cells and crossings; of a part those of the whole, see Part."""
+        return {where: np.arange(size) for where, size in self.sizes.items()}
+
+    @property
+    def sizes(self) -> Mapping[Where, int]:
+        """How many nodes, cells and crossings the whole has."""
+        return {
+            "nodes": len(self.points),
+            "cells": len(self.cells),
+            "crossings": len(self.crossings),
+        }
 
     @property
     def lengths(self) -> npt.NDArray[np.float64]:

@@ -20,7 +20,6 @@ import numpy.typing as npt
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
-from fabric_fenicsx.fabric.part import Part
 from fabric_fenicsx.output.files import write_bytes, write_text
 from fabric_fenicsx.output.vtk_xml import Packed, packed, parallel_file, xml_file
 from fabric_fenicsx.solving.snapshot import Snapshot
@@ -78,7 +77,7 @@ class TimeSeries:
     def __init__(
         self,
         folder: str | Path,
-        net: Net | Part,
+        net: Net,
         *,
         resume: bool = False,
         until: float = math.inf,
@@ -289,7 +288,7 @@ def _in_cells(snapshot: Snapshot) -> dict[str, Packed]:
     return _named(section_forces=snapshot.section_forces, section_moments=snapshot.section_moments)
 
 
-def _at_crossings(net: Net | Part, snapshot: Snapshot) -> dict[str, Packed]:
+def _at_crossings(net: Net, snapshot: Snapshot) -> dict[str, Packed]:
     shear = np.degrees(snapshot.shear_angle)
     return _named(
         displacement=snapshot.displacement[net.crossings].mean(axis=1),

@@ -24,8 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
-from ..fabric.net import Net
-from ..fabric.part import Where
+from ..fabric.net import Net, Where
 from ..parallel import from_root
 from ..solving.balance import Balance
 from ..solving.model import Model
@@ -105,8 +104,9 @@ class Record:
         # The step that was looked at last, and where the tools are in it.
         self._seen: tuple[Snapshot, dict[str, npt.NDArray[np.float64]]]
         until = math.inf if resume_at is None else resume_at * (1.0 + 1e-12)
-        if self._root:
-            self._open(None if resume_at is None else until)
+        net = model.disc.whole_net(to=0)
+        if net is not None and self._root:
+            self._open(net, None if resume_at is None else until)
             (folder / "case.yaml").unlink(missing_ok=True)
             if case_text is not None:
                 write_text(folder / "case.yaml", case_text)
@@ -121,16 +121,16 @@ class Record:
             until=until,
             rank=comm.rank,
             ranks=comm.size,
-            crossings=len(model.net.crossings) > 0,
+            crossings=model.net.sizes["crossings"] > 0,
             wait=comm.barrier,
         )
         self._series.last = comm.bcast(self._series.last)
         past = self.recent[-1] if self.recent else None
         self._balance = Balance(model, past, quarter=quarter)
 
-    def _open(self, until: float | None) -> None:
+    def _open(self, net: Net, until: float | None) -> None:
         """Start the steps and the table, or cut the table at the time to go on from."""
-        folder, net = self.folder, self.model.net
+        folder = self.folder
         self.steps.mkdir(exist_ok=True)
         extent = PLATE_EXTENT * float(np.abs(net.points[:, :2]).max())
         write_setup(folder, net, [tool_surface(t, extent, np.zeros(3)) for t in self.model.tools])
@@ -281,9 +281,10 @@ def load_state(path: Path, stepper: Stepper) -> None:
         InputError: it is not a step of this net.
     """
     disc, setup = stepper.net, path.parents[1] / "net.npz"
+    net = disc.whole_net(to=0)
 
     def check() -> None:
-        if setup.exists() and not _same(read_net(setup), disc.net):
+        if net is not None and setup.exists() and not _same(read_net(setup), net):
             raise InputError(f"{path}: a step of another net than that of this case")
 
     from_root(disc.comm, check)
@@ -303,8 +304,7 @@ def _load(file: StepFile, path: Path, stepper: Stepper) -> None:
     missing = {*STATE, *NUMBERS} - names
     if missing:
         raise KeyError(f"{', '.join(sorted(missing))} missing")
-    sizes = {"nodes": len(disc.net.points), "cells": len(disc.net.cells)}
-    sizes["crossings"] = len(disc.net.crossings)
+    sizes = disc.net.sizes
 
     def of_nodes(name: str, nodes: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
         rows, shape = file.rows(name, nodes, sizes["nodes"])

@@ -16,7 +16,7 @@ from typing import Any, get_args
 import numpy as np
 import numpy.typing as npt
 
-from fabric_fenicsx.fabric.part import Where
+from fabric_fenicsx.fabric.net import Where
 from fabric_fenicsx.output.files import write_npz
 
 __all__ = ["StepFile", "remove_step", "remove_torn", "step_path", "write_step"]

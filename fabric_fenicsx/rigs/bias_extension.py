@@ -8,6 +8,7 @@ hold places and turns of the tows' ends in them, all else is free.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -214,7 +215,8 @@ def build(
 
     net = tow_net(case, fabrics(case, session.base)["strip"], session)
     lower, upper = clamps(net, case)
-    free = np.setdiff1d(np.arange(len(net.points)), np.concatenate([lower, upper]))
+    numbers = net.numbers["nodes"]
+    free = np.delete(numbers, np.concatenate([lower, upper]))
     every, out_of_plane = (0, 1, 2, 3, 4, 5), (2, 3, 4)
 
     def pulled(time: float) -> Array:
@@ -231,8 +233,8 @@ def build(
         viscosity=case.tow.relaxation_time_s,
         gravity=(0.0, -case.gravity_mm_s2, 0.0),
         supports=[
-            Support(lower, every),
-            Support(upper, every, pulled),
+            Support(numbers[lower], every),
+            Support(numbers[upper], every, pulled),
             *([Support(free, out_of_plane)] if plane else []),
         ],
         interlacing=shares,
@@ -268,16 +270,8 @@ def waist(net: Net, case: BiasExtensionCase, displacement: Array) -> float:
     return float((right - left).min())
 
 
-def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
-    """Pull a strip and write its results. Collective.
-
-    Returns:
-        The content of result.json.
-    """
-    from .common import control, extend, simulated, write_table
-
-    model = build(case, session)
-    net = model.net
+def _looking(case: BiasExtensionCase, net: Net) -> Callable[[Snapshot], dict[str, float]]:
+    """What a step's snapshot of the net shows of angles, widths and slips."""
     lower, upper = clamps(net, case)
     middle, centre = middle_zone(net, case)
     warp, weft = net.crossings.T
@@ -285,13 +279,11 @@ def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
     edge = np.abs(net.points[warp, 0]) > case.width_mm / 2.0 - max(case.spacings) / 2.0
     edge = np.intersect1d(free, np.flatnonzero(edge))
 
-    def measure(snapshot: Snapshot) -> dict[str, float]:
+    def look(snapshot: Snapshot) -> dict[str, float]:
         u = snapshot.displacement
         slip = np.linalg.norm(u[weft] - u[warp], axis=1)
         angle = np.degrees(snapshot.shear_angle)
         return {
-            "displacement_mm": crosshead(case, snapshot.time),
-            "force_N": float(model.reactions()[upper, 1].sum()),
             "shear_angle_deg": float(angle[middle].mean()),
             "centre_angle_deg": float(angle[centre].mean()),
             "waist_mm": waist(net, case, u),
@@ -301,6 +293,29 @@ def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
             "largest_out_of_plane_mm": float(np.abs(u[:, 2]).max()),
         }
 
+    return look
+
+
+def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
+    """Pull a strip and write its results. Collective.
+
+    Returns:
+        The content of result.json.
+    """
+    from .common import control, extend, of_whole, simulated, write_table
+
+    model = build(case, session)
+    pulled = model.net.numbers["nodes"][clamps(model.net, case)[1]]
+    seen = of_whole(model, partial(_looking, case))
+
+    def measure(snapshot: Snapshot) -> dict[str, float]:
+        force = float(model.reactions_at(pulled)[:, 1].sum())
+        return {
+            "displacement_mm": crosshead(case, snapshot.time),
+            "force_N": float(model.comm.allreduce(force)),
+            **seen(snapshot),
+        }
+
     outcome = simulated(
         case,
         model,
@@ -308,7 +323,7 @@ def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
         end=duration(case),
         stops=turns(case),
         control=control(case.solver),
-        measure=measure,
+        measure_own=measure,
     )
     columns = {name: np.array([row[name] for row in outcome.rows]) for name in COLUMNS}
     write_table(session, "curve.csv", columns)
@@ -324,7 +339,8 @@ def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
             "largest_slip_mm": last["largest_slip_mm"],
             "largest_out_of_plane_mm": max(r["largest_out_of_plane_mm"] for r in outcome.rows),
         }
-        if session.root and session.pictures:
+        net = model.disc.whole_net(to=0) if session.pictures else None
+        if net is not None:
             from ..output.bias_strip import draw_curve, draw_strip
 
             folder = session.folder

@@ -6,6 +6,7 @@ is a net of its own. The weight is put on gradually; nothing moves in the end, s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -62,7 +63,7 @@ def build(case: CantileverCase, length: float, session: Session) -> Model:
     from .common import fabric_model, tow_net
 
     net = tow_net(case, strip(case, length), session)
-    clamped = np.flatnonzero(net.points[:, 0] < 1e-9 * np.ptp(net.points))
+    clamped = net.numbers["nodes"][net.points[:, 0] < 1e-9 * np.ptp(net.points)]
     return fabric_model(
         case,
         net,
@@ -108,15 +109,15 @@ def run(case: CantileverCase, session: Session) -> dict[str, Any]:
         totals = _add(totals, outcome)
         if not outcome.completed or outcome.last is None:
             break
-        last = outcome.last
-        s, x, z = midline(model.net, last.displacement)
+        net, last = model.disc.whole_net(to=0), outcome.last
+        s, x, z = session.comm.bcast(None if net is None else midline(net, last.displacement))
         columns = (np.full(len(s), length), s, x, z)
         for name, values in zip(tables, columns, strict=True):
             tables[name].append(values)
         specimens.append({"length_mm": length, "tip_x_mm": float(x[-1]), "tip_z_mm": float(z[-1])})
-        if session.root and session.pictures:
+        if net is not None and session.pictures:
             picture = session.folder / f"cantilever_{length:g}mm.png"
-            draw_net(picture, model.net, last, colour="bending_out_of_plane")
+            draw_net(picture, net, last, colour="bending_out_of_plane")
     joined = {name: np.concatenate(v) if v else np.zeros(0) for name, v in tables.items()}
     write_table(session, "shape.csv", joined)
     if session.root and session.pictures and specimens:
@@ -128,7 +129,7 @@ def _hang(
     case: CantileverCase, session: Session, model: Model, length: float, begun: float, share: float
 ) -> Run:
     from ..solving.stepping import StepControl
-    from .common import simulated
+    from .common import of_whole, simulated
 
     step = 1.0 / case.load_steps
     folder = session.folder / f"specimen_{length:g}mm"
@@ -136,9 +137,12 @@ def _hang(
         folder.mkdir(exist_ok=True)
     session.comm.barrier()
 
-    def measure(snapshot: Snapshot) -> dict[str, float]:
-        _, x, z = midline(model.net, snapshot.displacement)
-        return {"load": snapshot.time, "tip_x_mm": float(x[-1]), "tip_z_mm": float(z[-1])}
+    def looking(net: Net) -> Callable[[Snapshot], dict[str, float]]:
+        def look(snapshot: Snapshot) -> dict[str, float]:
+            _, x, z = midline(net, snapshot.displacement)
+            return {"load": snapshot.time, "tip_x_mm": float(x[-1]), "tip_z_mm": float(z[-1])}
+
+        return look
 
     def progress(done: float, number: int, iterations: int) -> None:
         session.progress(begun + share * done, number, iterations)
@@ -149,7 +153,7 @@ def _hang(
         replace(session, folder=folder, progress=progress, resume=False),
         end=1.0,
         control=StepControl(first=step, smallest=min(step, 1e-4), largest=step),
-        measure=measure,
+        measure_own=of_whole(model, looking),
     )
 
 

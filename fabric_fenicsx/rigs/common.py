@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..fabric.crossings import tow_numbers
 from ..fabric.gmsh_io import mesh_net, read_msh
 from ..fabric.net import WARP, WEFT, Net
+from ..fabric.part import Part
 from ..fabric.paths import TowPaths
 from ..fabric.section import BundleSection, FabricSection, RectangularSection, Section
 from ..mechanics.laws.law import CrossingLaw
@@ -25,6 +26,7 @@ from ..mechanics.stretch_laws import Uncrimping
 from ..output.files import write_text
 from ..parallel import from_root
 from ..solving.model import Model
+from ..solving.partition import handed_out
 from ..solving.parts import CrossoverLaw
 from ..solving.sections import Bending
 from ..solving.snapshot import Snapshot
@@ -39,6 +41,7 @@ __all__ = [
     "crossover_law",
     "extend",
     "mesh",
+    "of_whole",
     "section",
     "simulated",
     "tow_net",
@@ -255,7 +258,32 @@ def simulated(
         case_text=session.case_text,
         started=session.started,
         quarter=rig(case.test).quarter(case),
+        everywhere=False,
     )
+
+
+def of_whole(
+    model: Model, looking: Callable[[Net], Callable[[Snapshot], dict[str, float]]]
+) -> Callable[[Snapshot], dict[str, float]]:
+    """A ``measure_own`` of what only the whole net shows; rank 0 alone looks at it. Collective.
+
+    Args:
+        model: the model.
+        looking: from the net to what gives a step's columns from the snapshot of it.
+
+    Raises:
+        InputError: that of ``looking`` (on every rank).
+    """
+    net = model.disc.whole_net(to=0)
+    looks: list[Callable[[Snapshot], dict[str, float]]] = []
+    from_root(model.comm, lambda: looks.extend([] if net is None else [looking(net)]))
+
+    def measure(own: Snapshot) -> dict[str, float]:
+        snapshot = model.whole(own, to=0)
+        columns: dict[str, float] = model.comm.bcast(looks[0](snapshot) if looks else None)
+        return columns
+
+    return measure
 
 
 def mesh(fabric: TowPaths, *, comm: MPI.Comm = MPI.COMM_WORLD) -> Net:
@@ -272,8 +300,10 @@ def mesh(fabric: TowPaths, *, comm: MPI.Comm = MPI.COMM_WORLD) -> Net:
     return net
 
 
-def tow_net(case: Case, sheet: TowPaths, session: Session, *, crossing_gap: float = 0.0) -> Net:
+def tow_net(case: Case, sheet: TowPaths, session: Session, *, crossing_gap: float = 0.0) -> Part:
     """The net of a case: from its .msh, or from the sheet by gmsh. Collective.
+
+    Rank 0 makes it, and each rank keeps its part: see ``partition.handed_out``.
 
     Args:
         case: the case.
@@ -290,8 +320,9 @@ def tow_net(case: Case, sheet: TowPaths, session: Session, *, crossing_gap: floa
             return read_msh(session.base / case.mesh, crossing_gap=crossing_gap)
         return mesh_net(sheet, crossing_gap=crossing_gap)
 
-    net: Net = from_root(session.comm, load)
-    return net
+    made: list[Net] = []
+    from_root(session.comm, lambda: made.append(load()))
+    return handed_out(made[0] if made else None, session.comm)
 
 
 def write_table(

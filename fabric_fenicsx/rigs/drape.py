@@ -280,8 +280,8 @@ def symmetry_planes(net: Net) -> list[Support]:
 
     planes = []
     for axis, held in ((0, (0, 4, 5)), (1, (1, 3, 5))):
-        nodes = np.flatnonzero(np.abs(net.points[:, axis]) < 1e-9 * np.ptp(net.points))
-        planes.append(Support(nodes, held))
+        inside = np.abs(net.points[:, axis]) < 1e-9 * np.ptp(net.points)
+        planes.append(Support(net.numbers["nodes"][inside], held))
     return planes
 
 

@@ -22,21 +22,26 @@ if TYPE_CHECKING:
 
 __all__ = ["report"]
 
+Array = npt.NDArray[np.float64]
+
 
 def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dict[str, Any]:
     """Tables, pictures and quantities of the last accepted step."""
     quantities: dict[str, Any] = {}
     summary = outcome.summary
-    snapshot, net = outcome.last, model.net
+    snapshot = outcome.last
     if snapshot is not None:
+        net, stiffness = model.disc.whole_net(to=0), model.whole_stiffness(to=0)
         # One rank asks what the tools alone would make of the sheet, while rank 0 looks at it.
         beside = neighbour(session.comm)
         known = _known(case, session, outcome) if session.comm.rank == beside else None
-        summary["health"], summary["discretisation_error"], angles = from_root(
-            session.comm, lambda: _looked_at(case, model, snapshot, outcome)
+        summary["health"], summary["discretisation_error"], lowest_point, angles = from_root(
+            session.comm,
+            lambda: None if net is None else _looked_at(case, net, stiffness, snapshot, outcome),
         )
         known = session.comm.bcast(known, root=beside)
-        _write_crossings(session, net, snapshot)
+        if net is not None:
+            _write_crossings(session, net, snapshot)
         row = outcome.rows[-1]
         quantities = {
             "punch_depth_mm": case.punch_travel_mm * snapshot.time / case.duration_s,
@@ -44,20 +49,23 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
             "holder_force_N": -row["holder_force_z_N"],
             "holder_height_mm": row["holder_height_mm"],
             "largest_shear_angle_deg": row["largest_shear_deg"],
-            "lowest_point_mm": lowest(net, snapshot.displacement),
+            "lowest_point_mm": lowest_point,
             "kinetic_over_stored_energy": summary["health"]["kinetic_over_stored_energy"],
             "points": _points(case, angles, known),
         }
         if session.pictures:
-            _draw(case, session, model, snapshot)
+            _draw(case, session, model, net, snapshot)
     return extend(summary, quantities, session)
 
 
 def _looked_at(
-    case: DrapeCase, model: Model, snapshot: Snapshot, outcome: Run
-) -> tuple[dict[str, Any], dict[str, Any], npt.NDArray[np.float64]]:
-    """Health and discretisation error, and the angles at the case's points [rad], (n, 3)."""
-    summary, net = outcome.summary, model.net
+    case: DrapeCase, net: Net, stiffness: Array, snapshot: Snapshot, outcome: Run
+) -> tuple[dict[str, Any], dict[str, Any], float, Array]:
+    """Health, discretisation error, lowest point [mm] and angles at the case's points [rad].
+
+    Angles are (n, 3): axes' shear, its change, and the directors' turn.
+    """
+    summary = outcome.summary
     health = drape_health(
         net,
         snapshot,
@@ -68,7 +76,7 @@ def _looked_at(
         squeezed=_squeezed(case),
         axis=(case.punch_offset_x_mm, case.punch_offset_y_mm),
         quarter=case.symmetry == "quarter",
-        stiffness=model.stiffness,
+        stiffness=stiffness,
         iterations=summary["newton_iterations"],
         wasted=summary["wasted_iterations"],
     )
@@ -78,7 +86,8 @@ def _looked_at(
         kinds = (axes_shear(snapshot.axes), snapshot.shear_angle, snapshot.director_turn)
         quarter = case.symmetry == "quarter"
         angles = shear_at(net, np.column_stack(kinds), places, quarter=quarter)
-    return health, recovered_error(net, snapshot, mirrors(case)), angles
+    error = recovered_error(net, snapshot, mirrors(case))
+    return health, error, lowest(net, snapshot.displacement), angles
 
 
 def _known(case: DrapeCase, session: Session, outcome: Run) -> list[float | None]:
@@ -90,9 +99,7 @@ def _known(case: DrapeCase, session: Session, outcome: Run) -> list[float | None
     return known_angles(case, session.base)
 
 
-def _points(
-    case: DrapeCase, angles: npt.NDArray[np.float64], known: list[float | None]
-) -> list[dict[str, Any]]:
+def _points(case: DrapeCase, angles: Array, known: list[float | None]) -> list[dict[str, Any]]:
     """The case's points with the acute angle there, as a protractor on a photograph gives it."""
     return [
         {
@@ -124,12 +131,19 @@ def _write_crossings(session: Session, net: Net, snapshot: Snapshot) -> None:
     write_table(session, "crossings.csv", columns)
 
 
-def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -> None:
-    """Two pictures, each by a rank of its own where two can write."""
+def _draw(
+    case: DrapeCase, session: Session, model: Model, net: Net | None, snapshot: Snapshot
+) -> None:
+    """Two pictures, each by a rank of its own where two can write; rank 0 has what they show."""
     comm = session.comm
     folder = comm.bcast(session.folder.absolute())
     writers = sorted({0, neighbour(comm)})
-    if comm.rank not in writers:
+    for beside in writers[1:]:
+        if comm.rank == 0:
+            comm.send((net, snapshot), dest=beside)
+        elif comm.rank == beside:
+            net, snapshot = comm.recv(source=0)
+    if net is None:
         return
     from ..output.mirror import whole_sheet
     from ..output.pictures import draw_net
@@ -138,7 +152,6 @@ def _draw(case: DrapeCase, session: Session, model: Model, snapshot: Snapshot) -
     extent = 0.62 * max(case.sheet.width_mm, case.sheet.length_mm)
     surfaces = [tool_surface(tool, extent, model.tool_place(tool.name)) for tool in model.tools]
     depth = case.punch_travel_mm * snapshot.time / case.duration_s
-    net = model.net
     if case.symmetry == "quarter":
         net, snapshot = whole_sheet(net, snapshot)
     views = (

@@ -100,14 +100,14 @@ def frame_ends(net: Net, case: PictureFrameCase, place: Any = crosshead) -> Supp
     """The tow ends on the bars, moved affinely by the crosshead ``place(case, time)``."""
     from ..solving.model import Support
 
-    nodes = net.ends.ravel()
-    X = net.points[nodes]
+    places = net.ends.ravel()
+    X = net.points[places]
 
     def displacement(time: float) -> Array:
         e1, e2 = directions(frame_angle(place(case, time), case.frame_length_mm))
         return X[:, :1] * e1 + X[:, 1:2] * e2 - X * [1.0, 1.0, 0.0]
 
-    return Support(nodes, (0, 1, 2), displacement)
+    return Support(net.numbers["nodes"][places], (0, 1, 2), displacement)
 
 
 def build(case: PictureFrameCase, session: Session) -> Model:
@@ -130,12 +130,13 @@ def crosshead_force(model: Model, gamma: float, frame_length: float) -> float:
 
     With the ends at X e1 + Y e2, dx/dγ = X e1′ + Y e2′ and dD/dγ = L_frame sin θ.
     """
-    nodes = model.net.ends.ravel()
-    X = model.net.points[nodes]
+    places = model.net.ends.ravel()
+    X = model.net.points[places]
     half = gamma / 2.0
     s, c = np.sin(half) / 2.0, np.cos(half) / 2.0
     rate = X[:, :1] * [-s, c, 0.0] + X[:, 1:2] * [c, -s, 0.0]
-    work = float(np.sum(model.reactions()[nodes, :3] * rate))
+    reactions = model.reactions_at(model.net.numbers["nodes"][places])
+    work = float(model.comm.allreduce(float(np.sum(reactions[:, :3] * rate))))
     return work / (frame_length * np.sin(np.pi / 4.0 - half))
 
 
@@ -154,12 +155,13 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
         D = crosshead(case, snapshot.time)
         gamma = float(frame_angle(D, frame))
         force = crosshead_force(model, gamma, frame)
+        out_of_plane = float(np.abs(snapshot.displacement[:, 2]).max(initial=0.0))
         return {
             "displacement_mm": D,
             "force_N": force,
             "shear_angle_deg": float(np.degrees(gamma)),
             "normalised_force_N_mm": float(normalised_force(force, gamma, frame, fabric)),
-            "largest_out_of_plane_mm": float(np.abs(snapshot.displacement[:, 2]).max()),
+            "largest_out_of_plane_mm": max(session.comm.allgather(out_of_plane)),
         }
 
     outcome = simulated(
@@ -169,7 +171,7 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
         end=duration(case),
         stops=turns(case),
         control=control(case.solver),
-        measure=measure,
+        measure_own=measure,
     )
     rows = outcome.rows
     names = ("time_s", "displacement_mm", "force_N", "shear_angle_deg", "normalised_force_N_mm")
@@ -184,18 +186,19 @@ def run(case: PictureFrameCase, session: Session) -> dict[str, Any]:
             "largest_shear_angle_deg": max(row["shear_angle_deg"] for row in rows),
             "largest_out_of_plane_mm": max(row["largest_out_of_plane_mm"] for row in rows),
         }
-        if session.root and session.pictures:
-            _draw(session, model, outcome.last, columns)
+        net = model.disc.whole_net(to=0) if session.pictures else None
+        if net is not None:
+            _draw(session, net, outcome.last, columns)
     return extend(outcome.summary, quantities, session)
 
 
-def _draw(session: Session, model: Model, last: Snapshot, columns: dict[str, Array]) -> None:
+def _draw(session: Session, net: Net, last: Snapshot, columns: dict[str, Array]) -> None:
     from matplotlib.figure import Figure
 
     from ..output.files import replacing
     from ..output.pictures import draw_net
 
-    draw_net(session.folder / "picture_frame.png", model.net, last, view="top")
+    draw_net(session.folder / "picture_frame.png", net, last, view="top")
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     against_angle, against_time = figure.subplots(1, 2)
     force = columns["normalised_force_N_mm"]

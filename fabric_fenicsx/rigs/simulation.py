@@ -33,7 +33,7 @@ class Run:
         completed: whether it reached its end.
         stop: why it stopped, if it did not.
         rows: what was recorded at each accepted step.
-        last: the last accepted step, if there was one.
+        last: the last accepted step, if there was one, of the whole net; see ``simulate``.
         gaps: distance of its nodes from each tool [mm], (n_nodes,).
         summary: the fixed part of result.json.
     """
@@ -63,6 +63,7 @@ def simulate(
     case_text: str | None = None,
     started: float | None = None,
     quarter: bool = False,
+    everywhere: bool = True,
 ) -> Run:
     """Run a model to its end, or as far as it goes. Collective.
 
@@ -84,6 +85,8 @@ def simulate(
         started: perf_counter() at the start of the command, for the total seconds.
         quarter: whether the model is the part x >= 0, y >= 0 of a symmetric sheet; forces and
             energies of the rows are of the whole one.
+        everywhere: whether every rank gets the last step of the whole net; otherwise rank 0 does,
+            and the others have empty arrays.
 
     Returns:
         The run; ``completed`` is False where the step control gave up.
@@ -151,10 +154,11 @@ def simulate(
         "wasted_iterations": stepper.wasted_iterations,
         "factorisations": newton.factorisations,
         "ranks": model.comm.size,
-        "dofs": int(model.net.points.shape[0] * 6),
+        "dofs": int(model.net.sizes["nodes"] * 6),
         "seconds": {key: round(value, 3) for key, value in seconds.items()},
     }
-    whole = model.whole(last[0]) if last else None
-    gaps = model.disc.gather_nodes(record.gaps).T if last and model.tools else ()
+    to = None if everywhere else 0
+    whole = model.whole(last[0], to=to) if last else None
+    gaps = model.disc.gather_nodes(record.gaps, to=to).T if last and model.tools else ()
     by_tool = {tool.name: gap for tool, gap in zip(model.tools, gaps, strict=False)}
     return Run(stop is None, stop, record.rows(), whole, by_tool, summary)

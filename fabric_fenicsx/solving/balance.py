@@ -115,13 +115,12 @@ class Balance:
         model = self.model
         if not model.moving_supports:
             return 0.0
-        reaction = model.reactions()[:, :3]
+        reaction = model.own_reactions()[:, :3]
         before = np.zeros_like(reaction) if self._reaction is None else self._reaction
         self._reaction = reaction
-        increment = model.disc.gather_nodes(
-            model.fields.w.x.array.reshape(-1, 6)[: model.disc.owned, :3]
-        )
-        return float(np.sum((reaction + before) / 2.0 * increment))
+        increment = model.fields.w.x.array.reshape(-1, 6)[: model.disc.owned, :3]
+        own = float(np.sum((reaction + before) / 2.0 * increment))
+        return float(model.comm.allreduce(own))
 
 
 def _columns(values: Array, first: str, second: str) -> dict[str, float]:

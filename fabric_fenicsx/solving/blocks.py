@@ -37,14 +37,13 @@ def block_matrix(
         kind: PETSc's type of one that is not symmetric, BAIJ or AIJ.
     """
     n = comm.allreduce(owned)
-    i, j = pairs.T
-    ones = np.ones(len(i), dtype=np.int8)
-    graph = sparse.coo_matrix((ones, (i, j)), shape=(n, n)).tocsr()
-    graph = (graph + graph.T + sparse.identity(n, dtype=np.int8, format="csr")).tocsr()
-    if symmetric:
-        graph = sparse.triu(graph, format="csr")
     first = int(comm.scan(owned)) - owned
-    rows = graph[first : first + owned]
+    i, j = np.concatenate([pairs, pairs[:, ::-1]]).T
+    here = (i >= first) & (i < first + owned) & ((i < j) | (not symmetric))
+    diagonal = np.arange(owned)
+    i, j = np.append(i[here] - first, diagonal), np.append(j[here], diagonal + first)
+    ones = np.ones(len(i), dtype=np.int8)
+    rows = sparse.coo_matrix((ones, (i, j)), shape=(owned, n)).tocsr()
     inside = np.diff(rows[:, first : first + owned].indptr)
     outside = np.diff(rows.indptr) - inside
     A = PETSc.Mat().create(comm)

@@ -30,22 +30,24 @@ GROWTH = 1e3
 _TYPES = {"f8": "double[]", "i8": "int64_t[]", "i4": "int32_t[]", "i1": "int8_t[]"}
 
 
-def inner_nodes(disc: Discretisation, owner: Integers) -> npt.NDArray[np.bool_]:
-    """Nodes of the net whose equations have two neighbours and are all on one rank. Collective.
+def inner_nodes(disc: Discretisation) -> npt.NDArray[np.bool_]:
+    """This rank's own nodes whose equations have two neighbours and are all on it.
 
     Neither crossings nor ends of tows, and neither they nor their neighbours at a rank's edge.
 
     Args:
         disc: the discretised net.
-        owner: rank of each node, (n_nodes,).
+
+    Returns:
+        Whether each node of its part of the net is one, (n_nodes,).
     """
     net = disc.net
-    at = np.full(len(net.cells), -1)
-    for rank, cells in enumerate(disc.comm.allgather(disc.owned_cells)):
-        at[cells] = rank
-    inner = np.bincount(net.cells.ravel(), minlength=len(net.points)) == 2
+    own = np.zeros(len(net.points), dtype=bool)
+    own[disc.places[: disc.owned]] = True
+    inner = own & (np.bincount(net.cells.ravel(), minlength=len(net.points)) == 2)
     inner[net.crossings] = False
-    inner[net.cells[(owner[net.cells] != at[:, None]).any(axis=1)]] = False
+    edge = (net.ranks != disc.comm.rank) | ~own[net.cells].all(axis=1)
+    inner[net.cells[edge]] = False
     return inner
 
 

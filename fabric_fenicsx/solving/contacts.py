@@ -141,7 +141,7 @@ class Contacts:
                 work = contact.traction_work(tows, traction)
                 loss = contact.traction_loss(tows, traction, shift)
                 tangent = derivative(work, tows.w, tows.trial)
-                symmetric = law.friction <= LOW_FRICTION and len(disc.net.points) >= LARGE
+                symmetric = law.friction <= LOW_FRICTION and disc.net.sizes["nodes"] >= LARGE
                 if symmetric:
                     tangent = symmetric_part(tangent)
                 self.terms.append(
@@ -234,7 +234,7 @@ class Contacts:
             return False
         disc, tows = self._disc, self._disc.tows
         moved = tows.u_n.x.array.reshape(-1, 3) + tows.w.x.array.reshape(-1, BLOCK)[:, :3]
-        x = disc.net.points[disc.local_nodes] + moved
+        x = disc.net.points[disc.places] + moved
         upper = np.triu_indices(3)
         for tool, place, field in self._samples:
             d, n, H = tool.sample(x - place.value)

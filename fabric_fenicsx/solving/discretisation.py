@@ -1,7 +1,8 @@
 """A net as dolfinx fields: the tow mesh, the connector mesh, and the maps between their numberings.
 
-Three numberings meet here: nodes of the net (the same on any number of ranks, and what is written
-to disk), local blocks of this rank's dolfinx fields, and global blocks (rows of the matrix / 6).
+Four numberings meet here: nodes of the net (the same on any number of ranks, and what is written
+to disk), their places in this rank's part of it, local blocks of this rank's dolfinx fields, and
+global blocks (rows of the matrix / 6).
 The connectors of a rank are a mesh of its own (MPI_COMM_SELF): their dofs are not unknowns, they
 are copies of the tows' dofs, filled and emptied through global block numbers.
 """
@@ -21,12 +22,12 @@ import numpy.typing as npt
 from .. import _dolfinx
 from .._dolfinx import Function
 from ..fabric.crossings import reference_angle
-from ..fabric.net import Net
-from ..fabric.part import Part, Where
+from ..fabric.net import Net, Where
+from ..fabric.part import Part
 from ..mechanics.fields import ConnectorFields, TowFields
 from .blocks import BLOCK, block_matrix, expand
-from .exchange import Gather
-from .partition import partition
+from .exchange import Gather, Table
+from .partition import put_together
 from .update import advance
 
 __all__ = ["BLOCK", "Discretisation"]
@@ -55,8 +56,9 @@ class Discretisation:
     """Function spaces, fields and numbering of a net on a communicator.
 
     Args:
-        net: the whole net, on every rank.
-        stiffness: section stiffnesses per cell of the net, shape (n_cells, 6) [N, N mm²].
+        net: what this rank has of the net, see ``partition.handed_out``. Its cells and crossings
+            are meant by n_cells and n_crossings.
+        stiffness: section stiffnesses per cell, shape (n_cells, 6) [N, N mm²].
         mass: mass and three rotary inertias per cell, shape (n_cells, 4) [tonne/mm, tonne mm].
         comm: communicator of the run.
         interlacing, patch: shares of the in-plane moments at each crossing, see
@@ -65,15 +67,17 @@ class Discretisation:
     Attributes:
         tows: fields on the tow mesh.
         connectors: fields on this rank's connectors; None where it has none.
-        node_block: global block of each node of the net, shape (n_nodes,).
-        local_nodes: net node of each local block, owned blocks first.
+        node_block: global block of each node of ``net``, shape (n_nodes,).
+        places: which node of ``net`` each local block is, owned blocks first.
+        local_nodes: the same by the net's numbers.
         owned: number of blocks that this rank owns.
-        local_crossings: crossings of the net that this rank assembles.
+        cell_places: which cell of ``net`` each local cell is, owned cells first.
+        crossing_places: which crossings of ``net`` this rank assembles.
     """
 
     def __init__(
         self,
-        net: Net,
+        net: Part,
         stiffness: Array,
         mass: Array,
         comm: MPI.Comm,
@@ -86,8 +90,8 @@ class Discretisation:
         self.interlacing = whole if interlacing is None else interlacing
         self.patch = whole if patch is None else patch
         self._gathers: dict[Where, Gather] = {}
-        owners = partition(net, comm.size) if comm.rank == 0 else None
-        mesh = _dolfinx.interval_mesh(comm, net.points, net.cells, owners)
+        points = Table(comm, net.sizes["nodes"], net.nodes, net.points).share
+        mesh = _dolfinx.interval_mesh(comm, points, net.nodes[net.cells], net.ranks)
         space = _dolfinx.lagrange(mesh, BLOCK)
         self._number(mesh, space)
 
@@ -120,27 +124,41 @@ class Discretisation:
         blocks = space.dofmap.index_map
         self.owned = int(blocks.size_local)
         count = self.owned + int(blocks.num_ghosts)
-        self.local_nodes = np.full(count, -1, dtype=np.int64)
-        self.local_nodes[_dolfinx.cell_dofs(space).ravel()] = _dolfinx.input_nodes(mesh).ravel()
-        self.local_cells = _dolfinx.input_cells(mesh)
-        owned_cells = int(mesh.topology.index_map(mesh.topology.dim).size_local)
-        self.owned_cells = self.local_cells[:owned_cells]
+        self.places = np.full(count, -1, dtype=np.int64)
+        nodes = _dolfinx.input_nodes(mesh)
+        self.places[_dolfinx.cell_dofs(space).ravel()] = np.searchsorted(net.nodes, nodes.ravel())
+        self.local_nodes = net.nodes[self.places]
+        self._number_cells(mesh, nodes)
         self.global_blocks = blocks.local_to_global(np.arange(count, dtype=np.int32))
 
-        self.node_block = np.full(len(net.points), -1, dtype=np.int64)
-        for part in comm.allgather(
-            (self.local_nodes[: self.owned], self.global_blocks[: self.owned])
-        ):
-            self.node_block[part[0]] = part[1]
-        if self.node_block.min() < 0:
+        own = self.local_nodes[: self.owned], self.global_blocks[: self.owned, None]
+        blocks_of = Table(comm, net.sizes["nodes"], *own).at(net.nodes)[:, 0]
+        if not np.isfinite(blocks_of).all():
             raise RuntimeError("a node of the net has no place in the dolfinx mesh")
+        self.node_block = blocks_of.astype(np.int64)
         self.rows = expand(self.global_blocks)
 
         # A crossing is assembled by the rank that owns its warp node.
         first = self.global_blocks[0] if self.owned else 0
         warp_block = self.node_block[net.crossings[:, 0]]
         mine = (warp_block >= first) & (warp_block < first + self.owned)
-        self.local_crossings = np.flatnonzero(mine)
+        self.crossing_places = np.flatnonzero(mine)
+
+    def _number_cells(self, mesh: Any, nodes: npt.NDArray[np.int64]) -> None:
+        """Find the local cells, whose nodes are given by the net's numbers, (n, 2)."""
+        net, comm = self.net, self.comm
+        given = np.flatnonzero(net.ranks == comm.rank)
+        first = int(comm.scan(len(given))) - len(given)
+        owned = int(mesh.topology.index_map(mesh.topology.dim).size_local)
+        own = given[_dolfinx.input_cells(mesh)[:owned] - first]
+        # Ghosts are known by their nodes.
+        others = np.flatnonzero(net.ranks != comm.rank)
+        pairs = net.nodes[net.cells[others]], nodes[owned:]
+        known, asked = (a * net.sizes["nodes"] + b for a, b in (pair.T for pair in pairs))
+        order = np.argsort(known)
+        ghosts = others[order[np.searchsorted(known, asked, sorter=order)]]
+        self.cell_places = np.concatenate([own, ghosts])
+        self._owned_cells = owned
 
     def _connect(self) -> ConnectorFields | None:
         # Ranks take turns: each compiles the elements of a mesh of its own, into one cache.
@@ -152,7 +170,7 @@ class Discretisation:
         return fields
 
     def _own_connectors(self) -> ConnectorFields | None:
-        net, mine = self.net, self.local_crossings
+        net, mine = self.net, self.crossing_places
         self.connector_blocks = np.zeros(0, dtype=PETSc.IntType)
         self.connector_rows = expand(self.connector_blocks)
         if len(mine) == 0:
@@ -167,8 +185,9 @@ class Discretisation:
         vertex = np.zeros(2 * count, dtype=np.int64)
         vertex[_dolfinx.cell_dofs(space).ravel()] = _dolfinx.input_nodes(mesh).ravel()
         self.connector_order = _dolfinx.input_cells(mesh)
-        self.connector_nodes = net.crossings[mine].ravel()[vertex]
-        self.connector_blocks = self.node_block[self.connector_nodes].astype(PETSc.IntType)
+        places = net.crossings[mine].ravel()[vertex]
+        self.connector_nodes = net.nodes[places]
+        self.connector_blocks = self.node_block[places].astype(PETSc.IntType)
         self.connector_rows = expand(self.connector_blocks)
 
         vectors = _dolfinx.constants_per_cell(mesh, 3)
@@ -197,11 +216,11 @@ class Discretisation:
             form: the UFL form.
             often: whether it is evaluated in each iteration, and not only once a step.
         """
-        wide = len(self.net.cells) >= (MANY_OFTEN if often else MANY)
+        wide = self.net.sizes["cells"] >= (MANY_OFTEN if often else MANY)
         return _dolfinx.compile_form(form, self.comm, here=form is not None, wide=wide)
 
     def nodal_directions(self) -> dict[str, Array]:
-        """Unit "tangent" of the tow and unit "normal" of the sheet at every node of the net."""
+        """Unit "tangent" of the tow and unit "normal" of the sheet at every node of ``net``."""
         net = self.net
         nodal = {}
         for name, values in (("tangent", net.tangents), ("normal", net.normals)):
@@ -219,7 +238,7 @@ class Discretisation:
         return u, q
 
     def _crossing_directions(self) -> dict[str, Array]:
-        """Unit tangents of both tows and the unit normal at every crossing of the net."""
+        """Unit tangents of both tows and the unit normal at every crossing of ``net``."""
         net = self.net
         nodal = self.nodal_directions()
         warp, weft = net.crossings.T
@@ -230,10 +249,10 @@ class Discretisation:
         }
 
     def cell_field(self, space: Any, values: Array) -> Function:
-        """A field from values per cell of the net, shape (n_cells, size)."""
+        """A field from values per cell of ``net``, shape (n_cells, size)."""
         field = Function(space)
         dofs = _dolfinx.cell_dofs(space)[:, 0]
-        field.x.array.reshape(-1, values.shape[1])[dofs] = values[self.local_cells]
+        field.x.array.reshape(-1, values.shape[1])[dofs] = values[self.cell_places]
         return field
 
     def cell_values(self, field: Any) -> Array:
@@ -242,15 +261,15 @@ class Discretisation:
         return field.x.array.reshape(-1, field.function_space.dofmap.index_map_bs)[dofs]
 
     def crossing_field(self, space: Any, values: Array) -> Function:
-        """A connector field from values per crossing of the net, shape (n_crossings, size)."""
+        """A connector field from values per crossing of ``net``, shape (n_crossings, size)."""
         field = Function(space)
         dofs = _dolfinx.cell_dofs(space)[:, 0]
-        own = values[self.local_crossings][self.connector_order]
+        own = values[self.crossing_places][self.connector_order]
         field.x.array.reshape(len(dofs), -1)[dofs] = own.reshape(len(dofs), -1)
         return field
 
     def crossing_values(self, field: Any) -> Array:
-        """Values of a connector field at this rank's crossings, in the order of local_crossings."""
+        """Values of a connector field at this rank's crossings, in the order of the net."""
         dofs = _dolfinx.cell_dofs(field.function_space)[:, 0]
         values = field.x.array.reshape(len(dofs), -1)[dofs]
         ordered = np.zeros_like(values)
@@ -268,8 +287,8 @@ class Discretisation:
     def _node_lengths(self) -> Array:
         """Tow length of the owned cells at each local node [mm]."""
         local = np.zeros(len(self.local_nodes))
-        count = len(self.owned_cells)
-        half = self.net.lengths[self.owned_cells] / 2.0
+        count = self._owned_cells
+        half = self.net.lengths[self.cell_places[:count]] / 2.0
         np.add.at(local, _dolfinx.cell_dofs(self.tows.space)[:count].ravel(), np.repeat(half, 2))
         return local
 
@@ -309,7 +328,7 @@ class Discretisation:
     @property
     def pairs_by_mesh(self) -> dict[str, npt.NDArray[np.int64]]:
         """The same of each mesh, in the order of its cells."""
-        pairs = {"tows": _dolfinx.cell_dofs(self.tows.space)[: len(self.owned_cells)]}
+        pairs = {"tows": _dolfinx.cell_dofs(self.tows.space)[: self._owned_cells]}
         if self.connectors is not None:
             connectors = _dolfinx.cell_dofs(self.connectors.space)
             pairs["crossovers"] = self.own_vertices[connectors]
@@ -318,7 +337,7 @@ class Discretisation:
     def vector(self) -> PETSc.Vec:
         """A zero vector of the unknowns."""
         x = PETSc.Vec().create(self.comm)
-        x.setSizes((self.owned * BLOCK, len(self.net.points) * BLOCK))
+        x.setSizes((self.owned * BLOCK, self.net.sizes["nodes"] * BLOCK))
         x.setBlockSize(BLOCK)
         x.setType(PETSc.Vec.Type.STANDARD)
         x.set(0.0)
@@ -369,7 +388,7 @@ class Discretisation:
             local: of this rank, (n_owned_cells, size); rows of ghosts may follow.
             to: see ``gather_nodes``.
         """
-        return self._gather("cells", local[: len(self.owned_cells)], to)
+        return self._gather("cells", local[: self._owned_cells], to)
 
     def gather_crossings(self, local: Array, *, to: int | None = None) -> Array:
         """Rows per crossing of every rank, in the order of the net's crossings. Collective.
@@ -385,13 +404,19 @@ class Discretisation:
             self._gathers[where] = Gather(self.comm, self.numbers[where])
         return self._gathers[where](local, to=to)
 
-    @property
+    @cached_property
     def numbers(self) -> dict[Where, npt.NDArray[np.int64]]:
         """Net's numbers of the nodes, cells and crossings that this rank owns."""
+        whole = self.net.numbers
+        return {where: whole[where][places] for where, places in self._own.items()}
+
+    @property
+    def _own(self) -> dict[Where, npt.NDArray[np.int64]]:
+        """Places in ``net`` of what this rank owns."""
         return {
-            "nodes": self.local_nodes[: self.owned],
-            "cells": self.owned_cells,
-            "crossings": self.local_crossings,
+            "nodes": self.places[: self.owned],
+            "cells": self.cell_places[: self._owned_cells],
+            "crossings": self.crossing_places,
         }
 
     def in_order(self, where: Where, local: Array) -> Array:
@@ -407,8 +432,11 @@ class Discretisation:
     @cached_property
     def part(self) -> Part:
         """What of the net this rank owns, with the other ends of its cells and crossings."""
-        own = self.numbers
-        return Part.of(self.net, own["cells"], own["crossings"], own["nodes"])
+        return self.net.cut(**self._own)
+
+    def whole_net(self, to: int) -> Net | None:
+        """The whole net, on the rank ``to``; the others get None. Collective."""
+        return put_together(self.net, self._own, self.comm, to)
 
     def everywhere(self, update: Callable[[Any], None]) -> None:
         """Apply an update to the fields of the tows and to those of the connectors."""

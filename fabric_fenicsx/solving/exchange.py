@@ -10,7 +10,7 @@ from petsc4py import PETSc
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Copies", "Gather"]
+__all__ = ["Copies", "Gather", "Table"]
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -38,6 +38,37 @@ class Copies:
         self._own.array[:] = own.ravel()
         self._scatter.scatter(self._own, self._here)
         return np.array(self._here.array_r).reshape(-1, self._size)
+
+
+class Table:
+    """Rows by numbers that all ranks know, as the net's. Each rank holds a share. Collective.
+
+    Args:
+        comm: communicator.
+        size: how many numbers there are.
+        numbers: of the rows that this rank has, (n,); what several have is the same.
+        rows: (n, width).
+
+    Attributes:
+        share: rows that this rank holds, the ranks' one after the other, (n_share, width); not a
+            number where no rank had one.
+    """
+
+    def __init__(
+        self, comm: MPI.Comm, size: int, numbers: Integers, rows: npt.NDArray[Any]
+    ) -> None:
+        self._comm, width = comm, rows.shape[1]
+        share = size // comm.size + (comm.rank < size % comm.size)
+        table = PETSc.Vec().createMPI((share * width, None), bsize=width, comm=comm)
+        table.set(np.nan)
+        table.setValuesBlocked(numbers.astype(PETSc.IntType), np.ascontiguousarray(rows, float))
+        table.assemble()
+        self.share: Array = np.array(table.array_r).reshape(-1, width)
+        table.destroy()
+
+    def at(self, numbers: Integers) -> Array:
+        """Rows by number, (n, width). Collective."""
+        return Copies(self._comm, len(self.share), numbers, self.share.shape[1])(self.share)
 
 
 class Gather:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
-from ..fabric.part import Where
+from ..fabric.net import Where
 from ..mechanics import beam, crossover
 from .discretisation import Discretisation
 
@@ -168,8 +168,8 @@ class Histories:
             if where == "nodes":
                 values[:] = rows(name, where, disc.local_nodes)
                 continue
-            own = disc.local_cells
+            own = disc.net.cell_numbers[disc.cell_places]
             if where == "crossings":
-                own = disc.local_crossings[disc.connector_order]
+                own = disc.numbers["crossings"][disc.connector_order]
             dofs = _dolfinx.cell_dofs(field.function_space)[:, 0]
             values[dofs] = rows(name, where, own).reshape(len(own), size)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from .. import _dolfinx
 from ..fabric.net import Net
+from ..fabric.part import Part
 from ..fabric.section import Section
 from ..mechanics import beam, inertia
 from ..mechanics.fields import ConnectorFields, TowFields
@@ -26,6 +27,7 @@ from .discretisation import BLOCK, Discretisation
 from .generalised_alpha import GeneralisedAlpha, backward_difference
 from .history import Histories
 from .newton import Newton
+from .partition import handed_out
 from .parts import Crossings, CrossoverLaw
 from .sections import STRAIGHT, Bending, SectionLawName, diagonals, elastic_section
 from .seen import Seen
@@ -45,7 +47,8 @@ class Support:
     """Components of some nodes whose motion is prescribed.
 
     Attributes:
-        nodes: net nodes, shape (n,).
+        nodes: by the net's numbers (``Net.numbers``), shape (n,). A rank may leave out those that
+            its part of the net has not.
         components: of (u_x, u_y, u_z, θ_x, θ_y, θ_z), 0 to 5.
         displacement: displacement [mm] of the nodes at a time, shape (n, 3), for components 0
             to 2; None holds them. Turns (3 to 5) are held.
@@ -63,7 +66,9 @@ class Model:
     (ρA, ρI about the directors), (n_cells, 4) [tonne/mm, tonne mm].
 
     Args:
-        net: the net, on every rank.
+        net: the net, of which each rank keeps its part. Either rank 0's counts, or each rank gives
+            what it has of it, see ``partition.handed_out``; arrays for its tows and crossings
+            follow the net that is given.
         section: the section of all tows, or one each for warp and weft, or those that
             ``tow_section`` counts.
         tow_section: which of the sections each tow has, (n_tows,); by default its family's.
@@ -121,6 +126,10 @@ class Model:
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> None:
         sections = section if isinstance(section, tuple) else (section, section)
+        given, net = net, handed_out(net, comm)
+        if not isinstance(given, Part):
+            at = net.crossing_numbers
+            interlacing, patch = (s if s is None else s[at] for s in (interlacing, patch))
         kind = (net.tow_family if tow_section is None else tow_section)[net.cell_tow]
         stiffness = diagonals(sections)[kind]
         mass = self.mass = np.array([s.mass() for s in sections])[kind]
@@ -147,7 +156,7 @@ class Model:
 
         terms = self._tow_terms()
         self.crossings: Crossings | None = None
-        if len(net.crossings):
+        if net.sizes["crossings"]:
             if crossovers is None:
                 raise ValueError("a net with crossings needs a law for them")
             self.crossings = Crossings(self.disc, crossovers, self.histories)
@@ -201,24 +210,23 @@ class Model:
 
     def _number(self, supports: Sequence[Support]) -> None:
         disc = self.disc
-        place = np.full(len(self.net.points), -1)
-        place[disc.local_nodes[: disc.owned]] = np.arange(disc.owned)
+        own_nodes = disc.local_nodes[: disc.owned]
+        order = np.argsort(own_nodes)
         rows: list[npt.NDArray[Any]] = []
-        self._prescribed: list[tuple[slice, Support, npt.NDArray[Any], int]] = []
+        self._prescribed: list[tuple[slice, Support, npt.NDArray[Any], npt.NDArray[Any], int]] = []
         start = 0
         for support in supports:
-            local = place[support.nodes]
-            own = np.flatnonzero(local >= 0)
+            own = np.flatnonzero(np.isin(support.nodes, own_nodes))
+            local = order[np.searchsorted(own_nodes, support.nodes[own], sorter=order)]
             for component in support.components:
                 part = slice(start, start + len(own))
                 start += len(own)
-                rows.append(disc.global_blocks[local[own]] * BLOCK + component)
+                rows.append(disc.global_blocks[local] * BLOCK + component)
                 if support.displacement is not None and component < 3:
-                    self._prescribed.append((part, support, own, component))
+                    self._prescribed.append((part, support, own, local, component))
         self.fixed = (
             np.concatenate(rows).astype(PETSc.IntType) if rows else np.zeros(0, PETSc.IntType)
         )
-        self._place = place
 
     # What the stepper asks for ------------------------------------------------------------
 
@@ -238,10 +246,9 @@ class Model:
         """Prescribed increments of the fixed rows over a step."""
         values = np.zeros(len(self.fixed))
         u = self.fields.u_n.x.array.reshape(-1, 3)
-        for part, support, own, component in self._prescribed:
+        for part, support, own, local, component in self._prescribed:
             assert support.displacement is not None
-            wanted = support.displacement(end)[own, component]
-            values[part] = wanted - u[self._place[support.nodes[own]], component]
+            values[part] = support.displacement(end)[own, component] - u[local, component]
         return values
 
     def set_time(self, start: float, end: float) -> None:
@@ -288,14 +295,6 @@ class Model:
         if self.contacts is not None:
             self.contacts.stand(time)
 
-    def fixed_components(self) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-        """Net nodes and components of every fixed row of every support."""
-        nodes = [np.repeat(s.nodes, len(s.components)) for s in self._supports]
-        components = [np.tile(s.components, len(s.nodes)) for s in self._supports]
-        if not nodes:
-            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-        return np.concatenate(nodes), np.concatenate(components)
-
     def set_rates(self, c_0: float, c_1: float, turn: float = 0.0) -> None:
         """Constants of the time integration for this step.
 
@@ -311,7 +310,7 @@ class Model:
         self.c_0.value, self.c_1.value = c_0, c_1
         inertia = c_0 * float(self.mass_scale.value) * self.mass[:, 1:]
         rate = turn * inertia.max(axis=1) / (inertia.min(axis=1) + self._bending)
-        self.system.gyroscopic = bool(rate.max() > NEGLIGIBLE_RATE)
+        self.system.gyroscopic = bool(rate.max(initial=0.0) > NEGLIGIBLE_RATE)
 
     def firm_up(self) -> str:
         """Stiffen the contact where tows have sunk in too deep; says where. Collective."""
@@ -373,9 +372,26 @@ class Model:
 
     def reactions(self) -> Array:
         """Force and moment that supports exert on each node [N, N mm], (n_nodes, 6), every rank."""
+        return self.disc.gather_nodes(self.own_reactions())
+
+    def own_reactions(self) -> Array:
+        """The same on this rank's own nodes, as ``disc.numbers`` has them, (n_owned, 6)."""
         F = self.disc.vector()
         self.system.residual(F)
-        return self.disc.gather_nodes(F.array_r.reshape(-1, BLOCK))
+        return np.array(F.array_r).reshape(-1, BLOCK)
+
+    def reactions_at(self, nodes: npt.NDArray[np.int64]) -> Array:
+        """The same at some nodes, by the net's numbers; 0 at those that are another rank's.
+
+        Collective; which nodes is for each rank to say, as for ``Support``. Returns (n, 6).
+        """
+        own = self.disc.numbers["nodes"]
+        order = np.argsort(own)
+        found = np.zeros((len(nodes), BLOCK))
+        here = np.isin(nodes, own)
+        rows = order[np.searchsorted(own, nodes[here], sorter=order)]
+        found[here] = self.own_reactions()[rows]
+        return found
 
     def external_work(self, outside: dict[str, Array], reactions: Array) -> Array:
         """Virtual work of all that acts from outside, on w of this rank's nodes, (n_owned, 6).
@@ -393,6 +409,10 @@ class Model:
             work += part
         return work
 
+    def whole_stiffness(self, to: int) -> Array:
+        """``stiffness`` of the whole net's cells on one rank; the others get none. Collective."""
+        return self.disc.gather_cells(self.stiffness[self.disc.cell_places], to=to)
+
     def snapshot(self, time: float, outside: dict[str, Array] | None = None) -> Snapshot:
         """The state at the increment set last, in the order of the net, on every rank.
 
@@ -404,6 +424,11 @@ class Model:
         """The same of this rank's part of the net (``disc.part``) only. Collective."""
         return self._seen.own(time, self.outside() if outside is None else outside)
 
-    def whole(self, own: Snapshot) -> Snapshot:
-        """The whole net's snapshot from all ranks' own ones, on every rank. Collective."""
-        return self._seen.whole(own)
+    def whole(self, own: Snapshot, *, to: int | None = None) -> Snapshot:
+        """The whole net's snapshot from all ranks' own ones. Collective.
+
+        Args:
+            own: of this rank's part.
+            to: the rank that gets it; the others get an empty one. None: every rank.
+        """
+        return self._seen.whole(own, to=to)

@@ -30,7 +30,7 @@ class Momentum:
     def __init__(self, model: Model) -> None:
         self.model, self._disc = model, model.disc
         disc, net = model.disc, model.net
-        nodes = disc.local_nodes[: disc.owned]
+        nodes = disc.places[: disc.owned]
         # As the forms lump it: half of each cell to its nodes, J about the cell's directors.
         half = (net.lengths / 2.0)[:, None] * model.mass * float(model.mass_scale.value)
         axes = np.stack([net.tangents, np.cross(net.normals, net.tangents), net.normals], axis=1)

@@ -6,14 +6,21 @@ a partitioner that goes by it hands out whole tows, and half of the crossings co
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
+from mpi4py import MPI
+
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ..fabric.net import Net
+from ..fabric.net import Net, Where
+from ..fabric.part import Part, parts
+from .exchange import Gather
 
-__all__ = ["partition"]
+__all__ = ["handed_out", "partition", "put_together"]
 
 Integers = npt.NDArray[np.int64]
 
@@ -22,6 +29,64 @@ SAME = 1e-6
 
 #: Share of a part from which on a stretch of tow may be cut anywhere, as a tow that none crosses.
 LONG = 0.125
+
+
+def handed_out(net: Net | None, comm: MPI.Comm) -> Part:
+    """This rank's part of a net that rank 0 has. Collective.
+
+    Args:
+        net: the net on rank 0, what other ranks give does not count; or what each rank has of it.
+        comm: of the ranks.
+    """
+    if isinstance(net, Part):
+        return net
+    own: Part | None = None
+    if comm.rank == 0:
+        assert net is not None
+        if comm.size == 1:
+            return Part.all_of(net)
+        for rank, part in enumerate(parts(net, partition(net, comm.size), comm.size)):
+            if rank == 0:
+                own = part
+            else:
+                comm.send(part, dest=rank)
+    else:
+        own = comm.recv(source=0)
+    assert own is not None
+    return own
+
+
+def put_together(net: Part, own: Mapping[Where, Integers], comm: MPI.Comm, to: int) -> Net | None:
+    """The whole net on one rank; the others get None. Collective.
+
+    Args:
+        net: what this rank has of it.
+        own: places in there of the nodes, cells and crossings that are this rank's alone.
+        comm: of the ranks.
+        to: the rank that gets it.
+    """
+    if comm.size == 1:
+        return net
+    rows: dict[Where, npt.NDArray[Any]] = {
+        "nodes": net.points,
+        "cells": np.column_stack([net.nodes[net.cells], net.cell_tow, net.normals]),
+        "crossings": net.nodes[net.crossings],
+    }
+    points, cells, crossings = (
+        Gather(comm, net.numbers[where][own[where]])(values[own[where]], to=to)
+        for where, values in rows.items()
+    )
+    if comm.rank != to:
+        return None
+    return Net(
+        points=points,
+        cells=cells[:, :2].astype(np.int64),
+        cell_tow=cells[:, 2].astype(np.int64),
+        tow_family=net.tow_family,
+        crossings=crossings.astype(np.int64),
+        ends=net.nodes[net.ends],
+        normals=cells[:, 3:],
+    )
 
 
 def partition(net: Net, count: int) -> Integers:

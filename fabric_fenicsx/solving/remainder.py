@@ -49,11 +49,13 @@ DENSE = 3000
 class Left:
     """The nodes that are left, and the blocks on them.
 
+    Nodes have numbers that rise from rank to rank.
+
     Attributes:
         comm: of the ranks whose blocks are summed.
-        points: where the nodes are, on every rank, (n, 3).
-        pairs: nodes that are coupled, on every rank, (n_pairs, 2).
-        here: nodes that this rank adds to or owns, in rising order.
+        points: where the nodes ``here`` are, (n_here, 3).
+        pairs: nodes that are coupled, at least all pairs that one of ``own`` is in, (n_pairs, 2).
+        here: nodes that this rank adds to or owns, in rising order, (n_here,).
         own: nodes whose unknowns are this rank's, in rising order.
         places: rows and columns of this rank's blocks; those of a symmetric matrix above the
             diagonal only.
@@ -78,20 +80,17 @@ class ByMumps:
     """
 
     def __init__(self, left: Left, prefix: str) -> None:
-        comm, size = left.comm, len(left.points)
-        number = np.arange(size)
+        comm, size = left.comm, len(left.own)
+        pairs, places, self._rows = left.pairs, list(left.places), np.arange(size)
         kind = PETSc.Mat.Type.BAIJ
         # MUMPS takes the order as given, for LU of scalar matrices on one rank only.
         options: dict[str, Any] = {**ordering(comm)}
         if not left.symmetric and comm.size == 1:
-            number[np.concatenate(nested_dissection(left.points, left.pairs))] = np.arange(size)
+            self._rows[np.concatenate(nested_dissection(left.points, pairs))] = np.arange(size)
+            pairs, places = self._rows[pairs], [self._rows[part] for part in places]
             kind, options = PETSc.Mat.Type.AIJ, {"pc_factor_mat_ordering_type": "natural"}
-        self._R = block_matrix(
-            comm, number[left.pairs], len(left.own), symmetric=left.symmetric, kind=kind
-        )
-        self._places = [number[part].astype(PETSc.IntType)[:, None] for part in left.places]
-        first = int(comm.scan(len(left.own))) - len(left.own)
-        self._rows = number[left.own] - first
+        self._R = block_matrix(comm, pairs, size, symmetric=left.symmetric, kind=kind)
+        self._places = [part.astype(PETSc.IntType)[:, None] for part in places]
         self._scale = self._R.createVecLeft()
         self._new_solver = lambda: solver(
             comm, prefix, left.symmetric, mat_mumps_icntl_8=0, **options
@@ -149,7 +148,7 @@ class ByFronts:
         at_edge = np.flatnonzero(np.isin(here, edge))
         self._fronts = Fronts(
             functions,
-            left.points[here],
+            left.points,
             (np.searchsorted(here, left.places[0]), np.searchsorted(here, left.places[1])),
             at_edge,
         )
@@ -231,10 +230,12 @@ class ByFronts:
 
 def _edge(left: Left) -> Integers:
     """Nodes that several ranks add to, or others than their owner, on every rank. Collective."""
-    adding = np.zeros(len(left.points), dtype=np.int32)
-    adding[left.here] = 1
-    left.comm.Allreduce(MPI.IN_PLACE, adding)
-    return np.flatnonzero(adding > 1)
+    adding = PETSc.Vec().createMPI((len(left.own), None), comm=left.comm)
+    adding.setValues(left.here.astype(PETSc.IntType), np.ones(len(left.here)), addv=True)
+    adding.assemble()
+    several = left.own[adding.array_r > 1.0]
+    adding.destroy()
+    return np.concatenate(left.comm.allgather(several))
 
 
 def _solution(matrix: Array) -> Callable[[Array], Array] | None:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..fabric.axes import TowAxes, axes_shear
-from ..fabric.part import Where
+from ..fabric.net import Where
 from .exchange import Copies, Gather
 from .snapshot import Snapshot
 from .update import rotate
@@ -51,13 +51,13 @@ class Seen:
     def __init__(self, model: Model, symmetry: Sequence[int]) -> None:
         self._model = model
         net, disc = model.net, model.disc
-        part = disc.part
-        axes = TowAxes.of(net, symmetry, crossings=part.crossing_numbers)
-        nodes = np.union1d(part.nodes, axes.nodes)
+        axes = TowAxes.of(net, symmetry, crossings=disc.crossing_places)
+        self._own = np.searchsorted(net.nodes, disc.part.nodes)
+        nodes = np.union1d(self._own, axes.nodes)
         self._axes = axes.at_nodes(nodes)
-        self._places = np.searchsorted(nodes, part.nodes)
+        self._places = np.searchsorted(nodes, self._own)
         self._reference_shear = axes_shear(self._axes.at(np.zeros((len(nodes), 3))))
-        self._lengths = net.node_lengths[part.nodes]
+        self._lengths = net.node_lengths[self._own]
         # Displacement, quaternion and contact force.
         self._copies = Copies(disc.comm, disc.owned, disc.node_block[nodes], 8)
 
@@ -65,7 +65,7 @@ class Seen:
     def _reference_directors(self) -> tuple[Array, Array, Array]:
         disc = self._model.disc
         nodal = disc.nodal_directions()
-        d1, d3 = (nodal[name][disc.part.nodes] for name in ("tangent", "normal"))
+        d1, d3 = (nodal[name][self._own] for name in ("tangent", "normal"))
         return d1, np.cross(d3, d1), d3
 
     def own(self, time: float, outside: Mapping[str, Array]) -> Snapshot:
@@ -105,22 +105,22 @@ class Seen:
 
     @cached_property
     def _gathers(self) -> dict[Where, Gather]:
-        disc, part = self._model.disc, self._model.disc.part
-        numbers: dict[Where, npt.NDArray[np.int64]] = {
-            "nodes": part.nodes,
-            "cells": part.cell_numbers,
-            "crossings": part.crossing_numbers,
-        }
-        return {where: Gather(disc.comm, own) for where, own in numbers.items()}
+        disc = self._model.disc
+        return {where: Gather(disc.comm, own) for where, own in disc.part.numbers.items()}
 
-    def whole(self, own: Snapshot) -> Snapshot:
-        """The whole net's from those of all ranks' parts, on every rank. Collective."""
+    def whole(self, own: Snapshot, *, to: int | None = None) -> Snapshot:
+        """The whole net's from those of all ranks' parts. Collective.
+
+        Args:
+            own: that of this rank's part.
+            to: the rank that gets it; the others get an empty one. None: every rank.
+        """
         if self._model.comm.size == 1:
             return own
         arrays = {}
         for name in (field.name for field in fields(Snapshot) if field.name in PLACES):
             values = getattr(own, name)
             width = int(np.prod(values.shape[1:]))
-            rows = self._gathers[PLACES[name]](values.reshape(len(values), width))
+            rows = self._gathers[PLACES[name]](values.reshape(len(values), width), to=to)
             arrays[name] = rows.reshape(-1, *values.shape[1:])
         return Snapshot(time=own.time, **arrays)

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from ..fabric.axes import tow_axes
 from ..fabric.net import Net
-from ..fabric.part import Part
 
 __all__ = ["Snapshot", "at_rest"]
 
@@ -56,7 +55,7 @@ class Snapshot:
             raise ValueError(f"snapshot: time is {self.time}, not a finite number")
         self._check_shapes(len(self.displacement), len(self.section_forces), len(self.shear_angle))
 
-    def check(self, net: Net | Part) -> None:
+    def check(self, net: Net) -> None:
         """Make sure that the snapshot belongs to a net of this size.
 
         Args:

@@ -12,7 +12,9 @@ from mpi4py import MPI
 import numpy as np
 import numpy.typing as npt
 
+from .._dolfinx import Function
 from ..errors import SolveError
+from .blocks import BLOCK
 from .generalised_alpha import GeneralisedAlpha
 from .newton import Newton, Outcome
 from .predictor import Predictor
@@ -192,16 +194,18 @@ class Stepper:
         net.tows.rate_star.x.array[:] = self.state.v.ravel()
         self.newton.x.set(0.0)
         model.system.set_increment(self.newton.x)
-        force = -model.reactions()
+        force = -model.own_reactions()
         mass = np.zeros((len(force), 6, 6))
         for component in range(6):
             start[:] = np.eye(6)[component]
-            mass[:, :, component] = net.gather_nodes(model.system.term_forces("inertia"))
+            mass[:, :, component] = model.system.term_forces("inertia")
         start[:] = 0.0
-        acceleration = np.linalg.solve(mass, force[:, :, None])[:, :, 0]
-        nodes, components = model.fixed_components()
-        acceleration[nodes, components] = 0.0
-        self.state.vdot = acceleration[net.local_nodes]
+        acceleration = Function(net.tows.space)
+        own = acceleration.x.array[: force.size]
+        own[:] = np.linalg.solve(mass, force[:, :, None]).ravel()
+        own[model.fixed - (net.global_blocks[0] * BLOCK if net.owned else 0)] = 0.0
+        acceleration.x.scatter_forward()
+        self.state.vdot = acceleration.x.array.reshape(-1, BLOCK).copy()
         self.state.a = self.state.vdot.copy()
 
     def _turn(self, h: float) -> float:

@@ -26,6 +26,7 @@ from .blocks import BLOCK, expand
 from .condensation import Blocks, Elimination, Runs, inner_nodes
 from .direct import destroy, ordering, petsc, solved, solver
 from .discretisation import Discretisation
+from .exchange import Copies
 from .remainder import ByFronts, ByMumps, Left
 from .system import System
 
@@ -53,7 +54,7 @@ def tangent_of(system: System, free: PETSc.Vec, *, symmetric: bool, prefix: str)
         prefix: PETSc options prefix of the factorisation.
     """
     disc = system.net
-    inner = int(inner_nodes(disc, _owners(disc)).sum())
+    inner = int(disc.comm.allreduce(int(inner_nodes(disc).sum())))
     if inner and PETSc.Options().getBool(prefix + "condense", inner >= LEAST):
         source = Path(__file__).with_name("condensation.c")
         functions = _dolfinx.compile_source(source, disc.comm)
@@ -206,7 +207,8 @@ class Condensed:
     Attributes:
         matrix: stands for the tangent in PETSc's solvers; it has no entries.
         unknowns: how many the factorised matrix has.
-        refused: nodes of the net that are not eliminated, since their chain was found unstable.
+        refused: nodes of this rank's part of the net that are not eliminated, since their chain was
+            found unstable.
     """
 
     def __init__(
@@ -216,7 +218,7 @@ class Condensed:
         self._system, self._symmetric, self._prefix = system, symmetric, prefix
         self._functions = functions
         self._may_front = PETSc.Options().getBool(prefix + "fronts", True)
-        shape = (net.owned * BLOCK, len(net.net.points) * BLOCK)
+        shape = (net.owned * BLOCK, net.net.sizes["nodes"] * BLOCK)
         self.matrix = PETSc.Mat().createAIJ((shape, shape), nnz=0, comm=net.comm)
         self.matrix.assemble()
         self._A = net.own_matrix(symmetric=symmetric)
@@ -236,22 +238,23 @@ class Condensed:
     def _number(self) -> None:
         """Find the chains, number the nodes that stay, and make the matrix on these."""
         disc, net = self._net, self._net.net
-        owner = _owners(disc)
-        inner = inner_nodes(disc, owner) & ~self.refused
-        runs = Runs.of(net, inner)
+        own = disc.places[: disc.owned]
+        inner = inner_nodes(disc) & ~self.refused
+        self._runs = Runs.of(net, inner)
         pairs = np.vstack([net.cells, net.crossings])
-        pairs = np.vstack([pairs[~inner[pairs].any(axis=1)], runs.ends])
+        pairs = np.vstack([pairs[~inner[pairs].any(axis=1)], self._runs.ends])
         # Rank by rank, in the order of the blocks.
+        stay = ~inner[own]
+        left = int(stay.sum())
+        numbers = np.full((disc.owned, 1), -1)
+        numbers[stay, 0] = np.arange(left) + int(disc.comm.scan(left)) - left
+        number = Copies(disc.comm, disc.owned, disc.node_block, 1)(numbers)[:, 0].astype(np.int64)
+        pairs = pairs[(number[pairs] >= 0).all(axis=1)]
         by_block = np.argsort(disc.node_block)
-        left = by_block[~inner[by_block]]
-        number = np.full(len(net.points), -1)
-        number[left] = np.arange(len(left))
-        here = by_block[disc.own_blocks]
-        own = left[owner[left] == disc.comm.rank]
-        self._kept = disc.node_block[own] - (disc.own_blocks[0] if disc.owned else 0)
-        self.unknowns = len(left) * BLOCK
+        here = by_block[np.searchsorted(disc.node_block, disc.own_blocks, sorter=by_block)]
+        self._kept = np.flatnonzero(stay)
+        self.unknowns = int(disc.comm.allreduce(left)) * BLOCK
 
-        self._runs = runs.only(owner[runs.ends[:, 0]] == disc.comm.rank)
         place = np.full(len(net.points), -1)
         place[here] = np.arange(len(here))
         self._elimination = Elimination(
@@ -261,12 +264,15 @@ class Condensed:
             number[here],
             self._symmetric,
         )
+        added = np.unique(np.concatenate([*self._elimination.places, number[own[stay]]]))
+        by_number = np.argsort(number[here])
+        at = here[by_number[np.searchsorted(number[here], added, sorter=by_number)]]
         self._left = Left(
             disc.comm,
-            net.points[left],
+            net.points[at],
             number[pairs],
-            here=np.unique(np.concatenate([*self._elimination.places, number[own]])),
-            own=number[own],
+            here=added,
+            own=number[own[stay]],
             places=self._elimination.places,
             symmetric=self._symmetric,
         )
@@ -311,15 +317,14 @@ class Condensed:
     def factorise(self) -> None:
         """Eliminate, and factorise what is left. Collective."""
         self._since += 1
-        if self.refused.any() and self._since > AGAIN:
+        if self._since > AGAIN and any(self._net.comm.allgather(bool(self.refused.any()))):
             self.refused[:] = False
             self._renumber()
         while True:
             unstable = self._elimination.eliminate(_stored_blocks(self._A), self._free)
-            found = self._net.comm.allgather(self._runs.only(unstable).nodes)
-            if not any(len(nodes) for nodes in found):
+            self.refused[self._runs.only(unstable).nodes] = True
+            if not any(self._net.comm.allgather(bool(unstable.any()))):
                 break
-            self.refused[np.concatenate(found)] = True
             self._since = 0
             self._renumber()
         blocks = self._elimination.left
@@ -352,12 +357,6 @@ class Condensed:
             # Of what is held on a rank's edge every rank has a one on the diagonal.
             y.array[:] = np.where(self._held, b.array_r, g)
         return True
-
-
-def _owners(disc: Discretisation) -> npt.NDArray[np.int64]:
-    """Rank that owns each node of the net, on every rank. Collective."""
-    last = np.cumsum(disc.comm.allgather(disc.owned))
-    return np.searchsorted(last, disc.node_block, side="right")
 
 
 def _pattern(A: PETSc.Mat) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
