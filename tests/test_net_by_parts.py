@@ -94,14 +94,9 @@ def arrays_of(root):
     return found
 
 
-def as_large_as_the_whole(root, sizes):
-    """Ways to arrays with a number for each node, cell or crossing of the whole net, or a few."""
-    whole = {size * width for size in sizes.values() for width in (1, 2, 3, 4, 6, 7, 8, 9, 36)}
-    return [name for name, array in arrays_of(root) if whole & {array.size, *array.shape}]
-
-
 def stepped(comm, folder):
     """A model with all it can have, its stepper and its record, after a step."""
+    folder.mkdir(exist_ok=True)
     net = plain_net(11, 13, 4.0, 3)
     model = Model(
         net,
@@ -120,25 +115,29 @@ def stepped(comm, folder):
     record = Record(folder, model)
     stepper.observe, stepper.keep = record.observe, partial(record.keep, stepper=stepper)
     stepper.run(1.0)
-    return net, model, stepper, record
+    return model, stepper, record
 
 
 @pytest.mark.mpi
-def test_no_array_is_as_large_as_the_net(tmp_path):
-    """On several ranks; on one that same look finds them."""
+def test_no_array_is_as_large_as_on_one_rank(tmp_path):
+    """On several ranks, but for what is small beside a net: that has 954 nodes and 143 crossings.
+
+    The ranks' own and what lies about it are three quarters of it on two ranks, less on more.
+    """
     comm = MPI.COMM_WORLD
     folder = comm.bcast(tmp_path)
-    net, model, stepper, record = stepped(comm, folder)
-    large = as_large_as_the_whole([model, stepper, record], net.sizes)
-    alone = comm.size == 1
-    assert bool(large) == alone, large
-    if alone:
-        assert {"[0].net.points", "[0].disc.node_block", "[1].state.v"} <= set(large)
+    alone = dict(arrays_of(stepped(MPI.COMM_SELF, folder / f"alone {comm.rank}")))
+    known = {name for name, array in alone.items() if array.size >= 143}
+    assert {"[0].net.points", "[0].disc.node_block", "[0].stiffness", "[1].state.v"} <= known
+    if comm.size == 1:
         return
-    # Own and next to it; the ranks' nodes and a rim of whole bays between crossings on two sides.
-    mesh = model.fields.mesh.geometry.x
-    assert len(mesh) < 1.15 * len(net.points) / comm.size + 100
-    assert len(model.net.points) < len(net.points) / comm.size + 1000
+    together = stepped(comm, folder / "together")
+    for name, array in arrays_of(together):
+        # The matrix on the ranks' edges, whose nodes grow as the side of the net.
+        if not name.endswith("._dense"):
+            assert array.size < max(143, 0.9 * getattr(alone.get(name), "size", 0)), name
+    model = together[0]
+    assert len(model.fields.mesh.geometry.x) < 0.6 * 954
 
 
 @pytest.mark.mpi
