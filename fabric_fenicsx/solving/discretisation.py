@@ -432,7 +432,7 @@ class Discretisation:
     @cached_property
     def part(self) -> Part:
         """What of the net this rank owns, with the other ends of its cells and crossings."""
-        return self.net.cut(**self._own)
+        return self.net if self.comm.size == 1 else self.net.cut(**self._own)
 
     def whole_net(self, to: int) -> Net | None:
         """The whole net, on the rank ``to``; the others get None. Collective."""

@@ -62,8 +62,7 @@ class Support:
 class Model:
     """The paper's model of a net, on a communicator.
 
-    ``stiffness`` is the diagonal of each cell's section, (n_cells, 6) [N, N mm²], ``mass`` holds
-    (ρA, ρI about the directors), (n_cells, 4) [tonne/mm, tonne mm].
+    ``mass`` holds (ρA, ρI about the directors) of each cell, (n_cells, 4) [tonne/mm, tonne mm].
 
     Args:
         net: the net, of which each rank keeps its part. Either rank 0's counts, or each rank gives
@@ -133,7 +132,6 @@ class Model:
         kind = (net.tow_family if tow_section is None else tow_section)[net.cell_tow]
         stiffness = diagonals(sections)[kind]
         mass = self.mass = np.array([s.mass() for s in sections])[kind]
-        self.stiffness = stiffness
         # Softest of twist and bending over the cell length squared [N].
         self._bending = stiffness[:, 3:].min(axis=1) / net.lengths**2
         self.net, self.comm = net, comm
@@ -410,8 +408,11 @@ class Model:
         return work
 
     def whole_stiffness(self, to: int) -> Array:
-        """``stiffness`` of the whole net's cells on one rank; the others get none. Collective."""
-        return self.disc.gather_cells(self.stiffness[self.disc.cell_places], to=to)
+        """Diagonal of each cell's section on one rank, the others get none. Collective.
+
+        Of the whole net, (n_cells, 6) [N, N mm²].
+        """
+        return self.disc.gather_cells(self.disc.cell_values(self.fields.stiffness), to=to)
 
     def snapshot(self, time: float, outside: dict[str, Array] | None = None) -> Snapshot:
         """The state at the increment set last, in the order of the net, on every rank.
