@@ -79,7 +79,7 @@ def run(model: Model, tolerance: float, before: Any, after: Any) -> dict[str, An
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     return {
         "ranks": model.comm.size,
-        "dofs": len(model.net.points) * 6,
+        "dofs": model.net.sizes["nodes"] * 6,
         "unknowns": newton.unknowns,
         "steps": stepper.number,
         "newton_iterations": newton.iterations,
