@@ -120,7 +120,7 @@ def stepped(comm, folder):
 
 @pytest.mark.mpi
 def test_no_array_is_as_large_as_on_one_rank(tmp_path):
-    """On several ranks, but for what is small beside a net: that has 954 nodes and 143 crossings.
+    """On several ranks, but for what is small beside a net: 954 nodes, 930 cells, 143 crossings.
 
     The ranks' own and what lies about it are three quarters of it on two ranks, less on more.
     """
@@ -134,8 +134,12 @@ def test_no_array_is_as_large_as_on_one_rank(tmp_path):
     together = stepped(comm, folder / "together")
     for name, array in arrays_of(together):
         # The matrix on the ranks' edges, whose nodes grow as the side of the net.
-        if not name.endswith("._dense"):
-            assert array.size < max(143, 0.9 * getattr(alone.get(name), "size", 0)), name
+        if name.endswith("._dense"):
+            continue
+        if name in alone:
+            assert array.size < max(143, 0.9 * alone[name].size), name
+        else:
+            assert max(array.shape, default=0) < 0.9 * 930, name
     model = together[0]
     assert len(model.fields.mesh.geometry.x) < 0.6 * 954
 
