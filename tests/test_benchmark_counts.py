@@ -105,13 +105,14 @@ def counted_drape(folder, monkeypatch, **keys):
 def test_what_a_step_of_a_drape_costs_beside_its_iterations(tmp_path, monkeypatch):
     """No residual that Newton has, one form for all energies of a mesh, nothing gathered.
 
-    But for the distances to the tools at the end: of steps each rank sees and keeps its own part.
+    But for distances to the tools and stiffnesses at the end: of steps each rank sees and keeps its
+    own part.
     """
     count, result = counted_drape(tmp_path, monkeypatch)
     steps = result["steps"]
     assert count["residual"] == count["_function"] + count["firm_up found"]
     assert count["cell_sums"] == 2 * steps
-    assert count["_gather"] == 1
+    assert count["_gather"] == 2
 
 
 def test_a_pushed_tool_costs_no_solution_of_its_own(tmp_path, monkeypatch):

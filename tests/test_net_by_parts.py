@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from on_ranks import LAW, SECTION
+from on_ranks import LAW, SECTION, small_model
 from solve import plain_net, raised
 
 from fabric_fenicsx.fabric.axes import TowAxes
@@ -142,6 +142,18 @@ def test_no_array_is_as_large_as_on_one_rank(tmp_path):
             assert max(array.shape, default=0) < 0.9 * 930, name
     model = together[0]
     assert len(model.fields.mesh.geometry.x) < 0.6 * 954
+
+
+@pytest.mark.mpi
+def test_reactions_at_some_nodes_are_their_owners():
+    comm = MPI.COMM_WORLD
+    model = small_model(comm)
+    model.system.nodal_loads[:, 2] = 1.0
+    model.system.set_increment(model.disc.vector())
+    nodes = np.array([5, 0, 17, 9])
+    found = comm.allreduce(model.reactions_at(nodes))
+    np.testing.assert_array_equal(found, model.reactions()[nodes])
+    assert found[:, 2].all()
 
 
 @pytest.mark.mpi

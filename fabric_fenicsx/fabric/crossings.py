@@ -18,11 +18,13 @@ from .net import WARP, WEFT, Net
 
 __all__ = [
     "areas",
+    "at_nodes",
     "crossing_numbers",
     "crossings_by_tow",
     "node_tows",
     "reference_angle",
     "tow_numbers",
+    "unit",
 ]
 
 Floats = npt.NDArray[np.float64]
@@ -82,9 +84,9 @@ def reference_angle(net: Net) -> Floats:
     mechanics.crossover: π/2 less the angle from weft to warp.
     """
     warp, weft = net.crossings.T
-    t, s = (_at_nodes(net, net.tangents)[nodes] for nodes in (warp, weft))
-    normals = _at_nodes(net, net.normals)
-    n = _unit(normals[warp] + normals[weft])
+    t, s = (at_nodes(net, net.tangents)[nodes] for nodes in (warp, weft))
+    normals = at_nodes(net, net.normals)
+    n = unit(normals[warp] + normals[weft])
     return np.arctan2(np.einsum("ij,ij->i", s, t), np.einsum("ij,ij->i", n, np.cross(s, t)))
 
 
@@ -131,12 +133,13 @@ def node_tows(net: Net) -> Integers:
     return tow
 
 
-def _at_nodes(net: Net, values: Floats) -> Floats:
+def at_nodes(net: Net, values: Floats) -> Floats:
     """Unit vectors at the nodes from those of the cells."""
     total = np.zeros((len(net.points), 3))
     np.add.at(total, net.cells.ravel(), np.repeat(values, 2, axis=0))
-    return _unit(total)
+    return unit(total)
 
 
-def _unit(vectors: Floats) -> Floats:
+def unit(vectors: Floats) -> Floats:
+    """Vectors scaled to length one."""
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

@@ -31,7 +31,9 @@ def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dic
     summary = outcome.summary
     snapshot = outcome.last
     if snapshot is not None:
-        net, stiffness = model.disc.whole_net(to=0), model.whole_stiffness(to=0)
+        disc = model.disc
+        net = disc.whole_net(to=0)
+        stiffness = disc.gather_cells(disc.cell_values(disc.tows.stiffness), to=0)
         # One rank asks what the tools alone would make of the sheet, while rank 0 looks at it.
         beside = neighbour(session.comm)
         known = _known(case, session, outcome) if session.comm.rank == beside else None

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from .. import _dolfinx
 from .._dolfinx import Function
-from ..fabric.crossings import reference_angle
+from ..fabric.crossings import at_nodes, reference_angle, unit
 from ..fabric.net import Net, Where
 from ..fabric.part import Part
 from ..mechanics.fields import ConnectorFields, TowFields
@@ -222,12 +222,7 @@ class Discretisation:
     def nodal_directions(self) -> dict[str, Array]:
         """Unit "tangent" of the tow and unit "normal" of the sheet at every node of ``net``."""
         net = self.net
-        nodal = {}
-        for name, values in (("tangent", net.tangents), ("normal", net.normals)):
-            total = np.zeros((len(net.points), 3))
-            np.add.at(total, net.cells.ravel(), np.repeat(values, 2, axis=0))
-            nodal[name] = unit(total)
-        return nodal
+        return {"tangent": at_nodes(net, net.tangents), "normal": at_nodes(net, net.normals)}
 
     def current(self) -> tuple[Array, Array]:
         """Displacements (n_blocks, 3) [mm] and quaternions (n_blocks, 4) with the increment w."""
@@ -443,8 +438,3 @@ class Discretisation:
         update(self.tows)
         if self.connectors is not None:
             update(self.connectors)
-
-
-def unit(vectors: Array) -> Array:
-    """Rows scaled to length one."""
-    return vectors / np.linalg.norm(vectors, axis=1)[:, None]

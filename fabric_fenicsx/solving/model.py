@@ -407,13 +407,6 @@ class Model:
             work += part
         return work
 
-    def whole_stiffness(self, to: int) -> Array:
-        """Diagonal of each cell's section on one rank, the others get none. Collective.
-
-        Of the whole net, (n_cells, 6) [N, N mm²].
-        """
-        return self.disc.gather_cells(self.disc.cell_values(self.fields.stiffness), to=to)
-
     def snapshot(self, time: float, outside: dict[str, Array] | None = None) -> Snapshot:
         """The state at the increment set last, in the order of the net, on every rank.
 
