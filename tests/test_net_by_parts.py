@@ -1,5 +1,6 @@
 """No rank holds the whole net: what each has of it, that it suffices, and that it is no more."""
 
+from dataclasses import replace
 from functools import partial
 from types import FunctionType, MethodType
 
@@ -8,7 +9,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 from on_ranks import LAW, SECTION, small_model
-from solve import plain_net, raised
+from solve import Statics, plain_net, raised, set_loads
 
 from fabric_fenicsx.fabric.axes import TowAxes
 from fabric_fenicsx.fabric.crossings import (
@@ -142,6 +143,27 @@ def test_no_array_is_as_large_as_on_one_rank(tmp_path):
             assert max(array.shape, default=0) < 0.9 * 930, name
     model = together[0]
     assert len(model.fields.mesh.geometry.x) < 0.6 * 954
+
+
+@pytest.mark.mpi
+def test_crossings_are_apart_on_one_rank_only():
+    """The others have the same forms: the last warp tow alone lies above its wefts."""
+    comm = MPI.COMM_WORLD
+    net = plain_net(10, 3, 4.0, 2)
+    points = net.points.copy()
+    last = net.tow_family[net.cell_tow] == 0
+    last &= net.cell_tow == net.cell_tow[last].max()
+    points[net.cells[last], 2] += 0.1
+    net = replace(net, points=points)
+    supports = [Support(net.ends[:10, 0], (0, 1, 2, 3, 4, 5))]
+    found = []
+    for on in (MPI.COMM_SELF, comm):
+        model = Model(net, SECTION, crossovers=LAW, supports=supports, comm=on)
+        set_loads(model, int(net.ends[9, 1]), np.array([0.1, 0.0, 0.3, 0.0, 0.0, 0.0]))
+        statics = Statics(model, force_tolerance=1e-10)
+        statics.step(1.0, keep=True)
+        found.append(statics.displacements)
+    np.testing.assert_allclose(found[1], found[0], rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.mpi

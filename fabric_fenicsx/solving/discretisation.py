@@ -161,15 +161,19 @@ class Discretisation:
         self._owned_cells = owned
 
     def _connect(self) -> ConnectorFields | None:
+        net = self.net
+        offset = net.points[net.crossings[:, 1]] - net.points[net.crossings[:, 0]]
+        # The forms are to be the same on all ranks.
+        apart = any(self.comm.allgather(bool(offset.any())))
         # Ranks take turns: each compiles the elements of a mesh of its own, into one cache.
         fields = None
         for rank in range(self.comm.size):
             if rank == self.comm.rank:
-                fields = self._own_connectors()
+                fields = self._own_connectors(offset if apart else None)
             self.comm.barrier()
         return fields
 
-    def _own_connectors(self) -> ConnectorFields | None:
+    def _own_connectors(self, offset: Array | None) -> ConnectorFields | None:
         net, mine = self.net, self.crossing_places
         self.connector_blocks = np.zeros(0, dtype=PETSc.IntType)
         self.connector_rows = expand(self.connector_blocks)
@@ -193,7 +197,6 @@ class Discretisation:
         vectors = _dolfinx.constants_per_cell(mesh, 3)
         numbers = _dolfinx.constants_per_cell(mesh, 1)
         directions = self._crossing_directions()
-        offset = net.points[net.crossings[:, 1]] - net.points[net.crossings[:, 0]]
         return ConnectorFields(
             mesh=mesh,
             space=space,
@@ -206,7 +209,7 @@ class Discretisation:
             angle_0=self.crossing_field(numbers, reference_angle(net)),
             interlacing=self.crossing_field(numbers, self.interlacing),
             patch=self.crossing_field(numbers, self.patch),
-            offset=self.crossing_field(vectors, offset) if offset.any() else None,
+            offset=None if offset is None else self.crossing_field(vectors, offset),
         )
 
     def compiled(self, form: Any | None, *, often: bool = False) -> Any:
