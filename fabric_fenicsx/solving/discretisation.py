@@ -131,10 +131,10 @@ class Discretisation:
         self._number_cells(mesh, nodes)
         self.global_blocks = blocks.local_to_global(np.arange(count, dtype=np.int32))
 
+        if comm.allreduce(self.owned) != net.sizes["nodes"]:
+            raise RuntimeError("a node of the net has no place in the dolfinx mesh")
         own = self.local_nodes[: self.owned], self.global_blocks[: self.owned, None]
         blocks_of = Table(comm, net.sizes["nodes"], *own).at(net.nodes)[:, 0]
-        if not np.isfinite(blocks_of).all():
-            raise RuntimeError("a node of the net has no place in the dolfinx mesh")
         self.node_block = blocks_of.astype(np.int64)
         self.rows = expand(self.global_blocks)
 
