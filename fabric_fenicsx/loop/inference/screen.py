@@ -12,7 +12,7 @@ every pair, and every triple that a good pair is part of, can be looked at.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
@@ -35,8 +35,9 @@ Signatures = Mapping[Effect, Mapping[Variant, Sequence[Signature]]]
 LEFT = 1e-7
 #: Pairs that triples are looked for from, and pairs of one kind that are kept.
 BEST_PAIRS, FORMS = 12, 3
-#: Shapes of an effect that pairs are made of, those that take most off by themselves.
-MOST_SHAPES = 60
+#: Shapes of an effect that pairs are made of, those that take most off by themselves, and pairs of
+#: effects of which all of these are: the best of those with one shape of each form.
+MOST_SHAPES, MOST_PAIRS = 60, 60
 #: Times that amplitudes of the wrong sign are taken out.
 SIGNS = 3
 
@@ -184,15 +185,20 @@ class Screen:
         return [tuple((g.variant, g.signature) for g in one) for one in chosen]
 
     def _pairs(self) -> list[tuple[_Group, ...]]:
+        """Pairs of shapes: of all effects one of each form, of what then is the best more."""
         by_effect: dict[Effect, list[_Group]] = {}
         gains = self._gains([(g,) for g in self._groups])
         for k in np.argsort(-gains, kind="stable"):
             own = by_effect.setdefault(self._groups[k].effect, [])
             if len(own) < MOST_SHAPES:
                 own.append(self._groups[k])
-        pairs = combinations(by_effect.values(), 2)
-        found = [both for a, b in pairs for both in product(a, b)]
-        return [both for both in found if _compatible(both)]
+        first = [[*{g.variant: g for g in reversed(own)}.values()] for own in by_effect.values()]
+        found = _paired(combinations(first, 2))
+        best = self._ranked(found, MOST_PAIRS, forms=1)
+        chosen = [tuple(by_effect[group.effect] for group in pair) for pair in best]
+        tried = {tuple(id(group) for group in pair) for pair in found}
+        more = _paired(chosen)
+        return found + [pair for pair in more if tuple(id(g) for g in pair) not in tried]
 
     def _with_another(self, sets: Sequence[tuple[_Group, ...]]) -> list[tuple[_Group, ...]]:
         found = [
@@ -203,8 +209,16 @@ class Screen:
         ]
         return [several for several in found if _compatible(several)]
 
-    def _ranked(self, sets: Sequence[tuple[_Group, ...]], count: int) -> list[tuple[_Group, ...]]:
-        """Of the best sets of effects the best combinations of forms, one shape each."""
+    def _ranked(
+        self, sets: Sequence[tuple[_Group, ...]], count: int, forms: int = FORMS
+    ) -> list[tuple[_Group, ...]]:
+        """Of the best sets of effects the best combinations of forms, one shape each.
+
+        Args:
+            sets: of shapes.
+            count: of sets of effects.
+            forms: combinations of each.
+        """
         gains = self._gains(sets)
         cost = np.log(self._count) * np.array([sum(g.parameters for g in one) for one in sets])
         order = np.argsort(cost - gains)
@@ -214,11 +228,11 @@ class Screen:
             effects = frozenset(g.effect for g in one)
             if effects not in chosen and len(chosen) == count:
                 continue
-            forms = chosen.setdefault(effects, {})
+            own = chosen.setdefault(effects, {})
             variants = frozenset(g.variant for g in one)
-            if variants not in forms and len(forms) < FORMS:
-                forms[variants] = one
-        return [one for forms in chosen.values() for one in forms.values()]
+            if variants not in own and len(own) < forms:
+                own[variants] = one
+        return [one for own in chosen.values() for one in own.values()]
 
     def _gains(self, sets: Sequence[tuple[_Group, ...]]) -> Array:
         """What each set takes off the sum of squares, amplitudes of the wrong sign left out."""
@@ -260,6 +274,12 @@ def _columns(linear: ToFirstOrder, variant: Variant, one: Signature) -> tuple[Ar
         return linear.whitened(one.expected - one.base)[:, None], [True]
     names = [p.name for p in variant.amplitudes]
     return linear.columns(one, names), [p.one_sided for p in variant.amplitudes]
+
+
+def _paired(effects: Iterable[Sequence[Sequence[_Group]]]) -> list[tuple[_Group, ...]]:
+    """Each shape of one effect with each of another, of some pairs of effects."""
+    found = (both for a, b in effects for both in product(a, b))
+    return [both for both in found if _compatible(both)]
 
 
 def _compatible(groups: Sequence[_Group]) -> bool:
