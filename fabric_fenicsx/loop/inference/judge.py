@@ -261,12 +261,15 @@ class Judge:
         """Whether a model leaves noise, in what it was fitted to and in what it was not.
 
         A term without a formula explains nothing if holdout runs are less likely with it than
-        without, by what each says of them: that specimens differ, and how little it is known there.
+        without, by what each says of them: that specimens differ, and how little it is known there;
+        or if it expects a larger error there than what lacks the term.
         """
         out = self.held_rows
         if out.any() and not all(effect.listed for effect in model.effects):
-            mine, other = (m.fit.predictive_likelihood(out) for m in (model, baseline))
-            if mine >= other:
+            both = [model.fit, baseline.fit]
+            mine, other = (m.predictive_likelihood(out) for m in both)
+            sharp, vague = (self.expected_holdout(m, m.rms(m.used)) for m in both)
+            if mine >= other or sharp >= vague:
                 return False
         return self.fits(model, baseline) and self.foretells(model)
 

@@ -40,10 +40,11 @@ STEPS, BUMPS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 WIDTH, BUMP_WIDTHS = 0.03, (0.03, 0.1)
 #: Decays from the clamp or from the free end, as shares of it.
 DECAYS = (0.05, 0.2)
-#: Different overhangs from which on what goes by them may bend, or change at one of them.
+#: Different overhangs from which on what goes by them may bend, or change at one of them, and runs
+#: before another over which it may change.
 FEWEST_TO_BEND, FEWEST_TO_CHANGE = 4, 5
-#: Over how many runs something settles, as a share of them.
-FADING = (0.3, 1.0)
+#: Over how many runs something settles, or goes over into something else, as a share of them.
+FADING, SLOW = (0.3, 1.0), 0.15
 #: No coefficient is larger: a moment or a weight that is so many times another is none. But a
 #: bead at the end of a strip, whose weight is all in little of it, is.
 LARGEST, HEAVIEST = 10.0, 100.0
@@ -151,6 +152,15 @@ def over_runs(name: str, last: float, *, constant: bool = False) -> Iterator[Dra
         return sum(p[c.name] for c in zero) + step
 
     yield "step", (*zero, one, place), stepping
+    if last < FEWEST_TO_CHANGE:
+        return
+    slow = Parameter(f"{name}_width", (SLOW,), SHARP / last, 0.5)
+
+    def going_over(p: Values, x: Any) -> Any:
+        step = _shape("step", p, (one,), p[place.name], p[slow.name], x)
+        return sum(p[c.name] for c in zero) + step
+
+    yield "slow step", (*zero, one, place, slow), going_over
 
 
 def by_turns(name: str, last: float, *, constant: bool = False) -> Iterator[Drawn]:

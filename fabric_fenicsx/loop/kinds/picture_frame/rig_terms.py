@@ -135,7 +135,7 @@ OFTEN = (("reading", "displacement"), ("reading", "force"))
 GAINS = {"time": "time", "displacement": "displacement", "run": "run", "speed_size": "rate"}
 """What a load cell's gain may change with, beside the force, and its name in a report."""
 
-LINES = ("force_rate", "acceleration", "force_lag", "displacement_lag")
+LINES = ("force_rate", "force_lag", "displacement_lag")
 """Variables of which a term is a multiple."""
 
 
@@ -327,11 +327,14 @@ def _gains(name: str, variable: str, reach: float) -> Iterator[tuple[str, dict[s
             top = {"from_the_top": True} if of_the_force else {}
             yield label, numbers | {"coefficients": coefficients} | top
     if variable in CYCLES:
-        # In time nothing need be a sine: what is switched is not.
-        overtones = (0, 2) if variable == "time" else (0,)
-        drawn = *waves(name, CYCLES[variable], overtones), *bumps(name)
+        drawn = *waves(name, CYCLES[variable], _overtones(variable)), *bumps(name)
         for label, coefficients, numbers in drawn:
             yield label, numbers | {"coefficients": coefficients}
+
+
+def _overtones(variable: str) -> tuple[int, ...]:
+    """How many a wave has: in time nothing need be a sine, what is switched is not."""
+    return (0, 2) if variable == "time" else (0,)
 
 
 def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
@@ -374,11 +377,9 @@ def _added(
         if name.startswith("travel"):
             return
     constant = _zero(name, turning)
-    few = (
-        2
-        if turning in ("kept in a hold", "over a way")
-        else wealth(name.partition("_")[0], variable)
-    )
+    # Of an acceleration there are few readings.
+    seldom = turning in ("kept in a hold", "over a way") or variable == "acceleration"
+    few = 2 if seldom else wealth(name.partition("_")[0], variable)
     for label, coefficients, numbers in over(variable, name, few, reach):
         yield label, numbers | {"coefficients": coefficients} | constant
     if variable in ("time", "displacement") and not turning:
@@ -386,5 +387,5 @@ def _added(
             yield label, numbers | {"coefficients": coefficients} | constant
         # Where a run begins a wave may be anywhere.
         zero = {"constant": Parameter(f"{name}_0", amplitude=True)}
-        for label, coefficients, numbers in waves(name, CYCLES[variable]):
+        for label, coefficients, numbers in waves(name, CYCLES[variable], _overtones(variable)):
             yield label, numbers | {"coefficients": coefficients} | zero
