@@ -16,6 +16,7 @@ from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference.effects import Variant
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
 from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.foretold import Known
 from fabric_fenicsx.loop.inference.next_tests import best_tests, next_tests, next_tests_report
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.variances import Variances
@@ -98,6 +99,28 @@ def test_a_model_without_a_solution_advises_nothing():
     assert best_tests(without, further(), names, [square], [cube], SIGMA, {}) == []
     both = best_tests(without, further(), names, [square], [cube, square], SIGMA, {})
     assert both and both[0].separation < 1.0
+
+
+class NoSlopes(Lines):
+    """Slopes that are no numbers wherever a cube is other than it was fitted, as of a power."""
+
+    def predict(self, variants, values, deviations=NO_DEVIATIONS):
+        y, slopes = super().predict(variants, values, deviations)
+        if CUBE in variants and values["q"] != self.q:
+            slopes["q"] = np.full_like(self.t, np.nan)
+        return y, slopes
+
+
+def test_slopes_that_are_no_numbers_are_no_solution():
+    line, square, cube = fitted(SQUARE, CUBE)
+    broken = NoSlopes(line.t, line.readings.observed)
+    broken.q = cube.values["q"]
+    known = Known(broken, cube, SIGMA)
+    known.moved(known.at)
+    with pytest.raises(SolveError, match="not a number"):
+        known.moved(known.at + 0.1)
+    # The rival stays where it was fitted; nothing ends.
+    assert best_tests(broken, further(), ("one", "other"), [square], [cube], SIGMA, {})
 
 
 def columns(variant, t):

@@ -74,7 +74,9 @@ class Known:
         y, slopes = self._experiment.predict(self.fitted.variants, values)
         rows = self.fitted.used
         J = np.column_stack([slopes[name][rows] * self._weight for name in self.names])
-        return (y - self._alike)[rows] * self._weight, J
+        change = (y - self._alike)[rows] * self._weight
+        _check_numbers(change, J)
+        return change, J
 
     def drawn(self, count: int) -> list[tuple[Array, float]]:
         """Parameters that may be the true ones, (k,), each with D of the readings there are.
@@ -244,8 +246,7 @@ class Foretold:
         for name, k in other.items():
             J[:, k] = slopes[name] * self._scatter[name]
         rows = self._run.readings.usable
-        if not (np.isfinite(y[rows]).all() and np.isfinite(J[rows]).all()):
-            raise SolveError("the model is not a number at these parameters")
+        _check_numbers(y[rows], J[rows])
         weight = self._run.readings.weight[rows] / self.known.sigma
         return y[rows] * weight, J[rows] * weight[:, None]
 
@@ -257,6 +258,12 @@ class Foretold:
         before[:, : slopes.shape[1]] = slopes
         prior = np.eye(len(theta))[len(theta) - len(self._scatter) :]
         return np.concatenate([change, prior @ theta, y]), np.concatenate([before, prior, J])
+
+
+def _check_numbers(*arrays: Array) -> None:
+    """Refuse readings or slopes that are no numbers, as where a power overflows."""
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise SolveError("the model is not a number at these parameters")
 
 
 def _in_one_run(variant: Variant) -> Variant:
