@@ -327,14 +327,11 @@ def _gains(name: str, variable: str, reach: float) -> Iterator[tuple[str, dict[s
             top = {"from_the_top": True} if of_the_force else {}
             yield label, numbers | {"coefficients": coefficients} | top
     if variable in CYCLES:
-        drawn = *waves(name, CYCLES[variable], _overtones(variable)), *bumps(name)
+        # In time nothing need be a sine: what is switched is not.
+        overtones = (0, 2) if variable == "time" else (0,)
+        drawn = *waves(name, CYCLES[variable], overtones), *bumps(name)
         for label, coefficients, numbers in drawn:
             yield label, numbers | {"coefficients": coefficients}
-
-
-def _overtones(variable: str) -> tuple[int, ...]:
-    """How many a wave has: in time nothing need be a sine, what is switched is not."""
-    return (0, 2) if variable == "time" else (0,)
 
 
 def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
@@ -387,5 +384,5 @@ def _added(
             yield label, numbers | {"coefficients": coefficients} | constant
         # Where a run begins a wave may be anywhere.
         zero = {"constant": Parameter(f"{name}_0", amplitude=True)}
-        for label, coefficients, numbers in waves(name, CYCLES[variable], _overtones(variable)):
+        for label, coefficients, numbers in waves(name, CYCLES[variable]):
             yield label, numbers | {"coefficients": coefficients} | zero
