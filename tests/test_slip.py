@@ -98,6 +98,56 @@ def test_turning_a_corner_while_it_slips():
     assert orders(errors)[-1] == pytest.approx(1.0, abs=0.1)
 
 
+def pull_out(count, spacing):
+    """Travel of a yarn's end and force on it as one crossing after another begins to slide.
+
+    A yarn across others that are held: links of stiffness c = EA/spacing, springs k that give way
+    at F_s. Where m crossings slide, the n = N − m others carry, with cosh λ = 1 + k/2c and F_s in
+    the first of them, F_s sinh nλ / (2 sinh(λ/2) cosh (n − ½)λ); each link before has F_s more.
+    """
+    axial = SECTION.values[0] / spacing
+    size = np.arccosh(1.0 + K / (2.0 * axial))
+    corners = []
+    for sliding in range(count):
+        left = count - sliding
+        elastic = np.sinh(left * size) / (2.0 * np.sinh(size / 2.0))
+        links = LIMIT * (elastic / np.cosh((left - 0.5) * size) + np.arange(sliding + 1))
+        corners.append((LIMIT / K + links.sum() / axial, links[-1]))
+    return np.array(corners)
+
+
+def test_a_yarn_is_pulled_out_of_a_patch():
+    """One crossing after another slides, the nearest to the end first; then all of them do.
+
+    Beyond a spacing N F_s as well: no crossing is let go, whatever has slid out of it.
+    """
+    count, spacing = 5, 4.0
+    corners = pull_out(count, spacing)
+    assert (np.diff(corners, axis=0) > 0.0).all() and corners[-1, 1] == count * LIMIT
+    net = plain_net(count, 1, spacing, 2)
+    weft = np.unique(net.cells[net.tow_family[net.cell_tow] == 1])
+    warp = np.setdiff1d(np.arange(len(net.points)), weft)
+    end = weft[np.argmin(net.points[weft, 0])]
+    travel = [0.0, *corners[:, 0], corners[-1, 0] + 0.3, 1.5 * spacing]
+    law = CrossoverLaw(translation=K, k1=5.0, k3=2.0, dashpot=0.0, alignment=8.0, slip_limit=LIMIT)
+    every = (0, 1, 2, 3, 4, 5)
+
+    def pulled(time):
+        return np.array([[-np.interp(time, np.arange(len(travel)), travel), 0.0, 0.0]])
+
+    supports = [Support(warp, every), Support(np.array([end]), (0, 1, 2), pulled)]
+    model = Model(net, SECTION, crossovers=law, supports=supports)
+    forces = []
+
+    def observe(step):
+        forces.append(-model.reactions()[end, 0])
+
+    newton = model.newton(force_tolerance=1e-9, limit=30)
+    Stepper(model, newton, StepControl(1.0, 1e-6, 1.0), observe=observe).run(len(travel) - 1.0)
+    exact = [*corners[:, 1], *[count * LIMIT] * 2]
+    assert forces == pytest.approx(exact, rel=1e-7)
+
+
 def test_across_the_sheet_nothing_slips():
     force, _, lost = dragged(lambda t: np.array([0.0, 0.0, t]), [1.0])
     assert force[0] == pytest.approx([0.0, 0.0, K], abs=1e-9)
