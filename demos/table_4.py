@@ -90,20 +90,17 @@ def points_table(drape: ff.Drape, d: Any) -> list[str]:
 def effects_table(d: Any) -> list[str]:
     """Every effect by itself."""
     lines = [
-        "| effect | probability by chance | fitted | weighted rms left | left out in turn |",
-        "|---|---|---|---|---|",
+        "| effect | probability by chance | fitted | weighted rms left |",
+        "|---|---|---|---|",
     ]
     rows = d.baseline.used
     for c in d.candidates:
         if c.fit is None:
-            lines.append(f"| {c.effect.name} | {c.p_value:.2g} | no solution | | |")
+            lines.append(f"| {c.effect.name} | {c.p_value:.2g} | no solution | |")
             continue
         errors = c.fit.errors
         fitted = ", ".join(f"{n} = {v:.3g} ± {errors[n]:.2g}" for n, v in c.fit.values.items())
-        lines.append(
-            f"| {c.effect.name} | {c.p_value:.2g} | {fitted} | {c.fit.rms(rows):.2f}° | "
-            f"{c.holdout:.2f}° |"
-        )
+        lines.append(f"| {c.effect.name} | {c.p_value:.2g} | {fitted} | {c.fit.rms(rows):.2f}° |")
     return lines
 
 
@@ -147,8 +144,7 @@ def page(drape: ff.Drape, d: Any, report: dict[str, Any]) -> str:
         f"> {report['headline']}",
         "",
         "Errors in the headline are weighted: a reading counts by its standard deviation and the",
-        "model's waves together. Without holdout runs the held-out error is of each reading",
-        "predicted from the others.",
+        "model's waves together. Five readings are too few to predict some from the others.",
         "",
         "## The readings",
         "",
