@@ -118,8 +118,10 @@ class Fit:
         expected, white, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum of squares. NaN if there are
         none; infinite where what is expected, or its slope, is not a number.
         """
+        if not rows.any():
+            return float("nan")
         left, _ = self._predicted(rows)
-        return float(np.sqrt(left / rows.sum())) if rows.any() else float("nan")
+        return float(np.sqrt(left / rows.sum()))
 
     def predictive_likelihood(self, rows: Flags) -> float:
         """−2 log of the density of the readings there, as they are predicted, but for n ln 2π.

@@ -131,10 +131,14 @@ class Screen:
         return ((group.variant, group.signature),)
 
     @cached_property
+    def _alone(self) -> Array:
+        """What each shape takes off by itself."""
+        return self._gains([(g,) for g in self._groups])
+
+    @cached_property
     def _worth(self) -> Array:
         """What each shape takes off, less what it costs."""
-        gains = self._gains([(g,) for g in self._groups])
-        return gains - np.log(self._count) * np.array([g.parameters for g in self._groups])
+        return self._alone - np.log(self._count) * np.array([g.parameters for g in self._groups])
 
     @cached_property
     def _best_of_each(self) -> dict[Effect, int]:
@@ -187,8 +191,7 @@ class Screen:
     def _pairs(self) -> list[tuple[_Group, ...]]:
         """Pairs of shapes: of all effects one of each form, of what then is the best more."""
         by_effect: dict[Effect, list[_Group]] = {}
-        gains = self._gains([(g,) for g in self._groups])
-        for k in np.argsort(-gains, kind="stable"):
+        for k in np.argsort(-self._alone, kind="stable"):
             own = by_effect.setdefault(self._groups[k].effect, [])
             if len(own) < MOST_SHAPES:
                 own.append(self._groups[k])

@@ -12,7 +12,7 @@ from ufl import cos, exp
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import shape_of
-from ...inference.effects import Values
+from ...inference.effects import Values, valued
 from ..records import FEWEST_BY_TURNS, SHARP, between_runs
 
 __all__ = [
@@ -147,20 +147,18 @@ def over_runs(name: str, last: float, *, constant: bool = False) -> Iterator[Dra
         return
     place = Parameter(f"{name}_place", between_runs(last), 0.0, 1.0)
 
-    def stepping(p: Values, x: Any) -> Any:
-        step = _shape("step", p, (one,), p[place.name], SHARP / last, x)
-        return sum(p[c.name] for c in zero) + step
-
-    yield "step", (*zero, one, place), stepping
-    if last < FEWEST_TO_CHANGE:
-        return
     slow = Parameter(f"{name}_width", (SLOW,), SHARP / last, 0.5)
 
-    def going_over(p: Values, x: Any) -> Any:
-        step = _shape("step", p, (one,), p[place.name], p[slow.name], x)
-        return sum(p[c.name] for c in zero) + step
+    def stepping(width: Parameter | float) -> Of:
+        def step(p: Values, x: Any) -> Any:
+            own = _shape("step", p, (one,), p[place.name], valued(width, p), x)
+            return sum(p[c.name] for c in zero) + own
 
-    yield "slow step", (*zero, one, place, slow), going_over
+        return step
+
+    yield "step", (*zero, one, place), stepping(SHARP / last)
+    if last >= FEWEST_TO_CHANGE:
+        yield "slow step", (*zero, one, place, slow), stepping(slow)
 
 
 def by_turns(name: str, last: float, *, constant: bool = False) -> Iterator[Drawn]:
