@@ -204,11 +204,11 @@ def large_table(found: dict[str, tuple[pd.DataFrame, dict[str, Any], Path]]) -> 
     """Angles, force, slip and effort of the large strip."""
     lines = [
         f"| 150 x 450 mm | angle [°] at {', '.join(f'{d:g}' for d in TRAVELS)} mm | force at "
-        "105 mm [N] | slip at 105 mm: largest, edges, mean [mm] | steps, iterations |",
-        "|---|---|---|---|---|",
+        "105 mm [N] | slip at 105 mm: largest, edges, mean [mm] | let go | steps, iterations |",
+        "|---" * 6 + "|",
     ]
     formula = np.degrees(ff.BiasStrip(450.0, 150.0).angle(np.array(TRAVELS)))
-    lines.append(f"| formula | {', '.join(f'{a:.1f}' for a in formula)} | | | |")
+    lines.append(f"| formula | {', '.join(f'{a:.1f}' for a in formula)} | | | | |")
     for name, (curve, result, _) in found.items():
         x = curve["displacement_mm"]
         angle = CubicSpline(x, curve["shear_angle_deg"])(TRAVELS)
@@ -216,7 +216,7 @@ def large_table(found: dict[str, tuple[pd.DataFrame, dict[str, Any], Path]]) -> 
         slip = [last[f"{which}_slip_mm"] for which in ("largest", "edge", "mean")]
         lines.append(
             f"| {name} | {', '.join(f'{a:.1f}' for a in angle)} | {last['force_N']:.1f} | "
-            f"{', '.join(f'{s:.2f}' for s in slip)} | "
+            f"{', '.join(f'{s:.2f}' for s in slip)} | {last['crossings_let_go']:.1f} | "
             f"{result['steps']}, {result['newton_iterations']} |"
         )
     return lines

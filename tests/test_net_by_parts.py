@@ -17,6 +17,7 @@ from fabric_fenicsx.fabric.crossings import (
     crossing_numbers,
     node_tows,
     reference_angle,
+    spans,
 )
 from fabric_fenicsx.fabric.net import single_tow
 from fabric_fenicsx.fabric.part import parts
@@ -43,7 +44,8 @@ def test_a_part_knows_of_its_own_what_the_net_knows(count):
         np.testing.assert_array_equal(part.nodes[part.ends], net.ends)
         crossings = np.flatnonzero(np.isin(net.crossings, near).any(axis=1))
         own = np.searchsorted(part.crossing_numbers, crossings)
-        for of in (reference_angle, areas, lambda one: np.transpose(crossing_numbers(one))):
+        both = [partial(spans, side=side) for side in (0, 1)]
+        for of in (reference_angle, areas, *both, lambda n: np.transpose(crossing_numbers(n))):
             np.testing.assert_array_equal(of(part)[own], of(net)[crossings])
         found = TowAxes.of(part, (0,), crossings=own)
         np.testing.assert_array_equal(part.nodes[found.nodes], axes.nodes[crossings])

@@ -23,6 +23,7 @@ __all__ = [
     "crossings_by_tow",
     "node_tows",
     "reference_angle",
+    "spans",
     "tow_numbers",
     "unit",
 ]
@@ -117,6 +118,28 @@ def _reach(net: Net, side: int) -> Floats:
     reach[order] = np.where(np.append(False, same), np.append(0.0, halves), first)
     reach[order] += np.where(np.append(same, False), np.append(halves, 0.0), last)
     return reach
+
+
+def spans(net: Net, side: int) -> Floats:
+    """What a crossing has of its warp (0) or weft (1) tow either way, (n_crossings, 4) [mm].
+
+    Columns: how far its first node and its last node are, and how far its patch reaches towards
+    them: half-way to the next crossing; beyond the outer ones as far as on their other side, and
+    never past the end; of a tow's only crossing half-way to the ends.
+    """
+    nodes, tow = net.crossings[:, side], node_tows(net)
+    order = np.argsort(nodes)
+    at, owner = net.points[nodes[order]], tow[nodes[order]]
+    ends = np.linalg.norm(net.points[net.ends[owner]] - at[:, None], axis=2)
+    halves = np.linalg.norm(np.diff(at, axis=0), axis=1) / 2.0
+    halves[np.diff(owner) != 0] = np.inf
+    before, after = np.append(np.inf, halves), np.append(halves, np.inf)
+    patch = np.column_stack([before, after])
+    patch = np.where(np.isfinite(patch), patch, patch[:, ::-1])
+    patch = np.where(np.isfinite(patch), np.minimum(patch, ends), ends / 2.0)
+    found = np.empty((len(nodes), 4))
+    found[order] = np.column_stack([ends, patch])
+    return found
 
 
 def crossings_by_tow(net: Net, side: int) -> list[Integers]:

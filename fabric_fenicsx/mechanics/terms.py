@@ -15,7 +15,15 @@ from ufl import derivative
 
 from .fields import ConnectorFields, TowFields
 
-__all__ = ["Term", "energy_term", "side_by_side", "symmetric_part", "total", "work_term"]
+__all__ = [
+    "Term",
+    "energy_term",
+    "side_by_side",
+    "symmetric_part",
+    "times",
+    "total",
+    "work_term",
+]
 
 Where = Literal["tows", "crossovers"]
 
@@ -86,11 +94,12 @@ def side_by_side(integrals: Sequence[Any], space: Any) -> Any:
     """
     test = ufl.TestFunction(space)
     components = [test] if len(integrals) == 1 else [test[i] for i in range(len(integrals))]
-    shares = [
-        ufl.Form([part.reconstruct(part.integrand() * component) for part in whole.integrals()])
-        for whole, component in zip(integrals, components, strict=True)
-    ]
-    return total(shares)
+    return total([times(*pair) for pair in zip(integrals, components, strict=True)])
+
+
+def times(form: Any, factor: Any) -> Any:
+    """A form whose integrands are multiplied by an expression."""
+    return ufl.Form([part.reconstruct(part.integrand() * factor) for part in form.integrals()])
 
 
 def total(forms: Sequence[Any]) -> Any:

@@ -45,6 +45,8 @@ __all__ = [
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
+#: Share by which the limit of slip rises where a crossing slips as fast as the crosshead goes.
+SLIP_DRAG = 0.02
 COLUMNS = (
     "time_s",
     "displacement_mm",
@@ -55,11 +57,13 @@ COLUMNS = (
     "largest_slip_mm",
     "mean_slip_mm",
     "edge_slip_mm",
+    "crossings_let_go",
 )
 """Of curve.csv. Angles are those between the tows' axes, from places of neighbouring crossings: the
 mean over zone A, all crossings whose two tows end in no clamp, and over the same zone at half its
 length and width. Slip is how far the two tows of a crossing have parted, its springs' stretch
-included: the largest, the mean, and the mean on the free edges, without crossings in the clamps."""
+included: the largest, the mean, and the mean on the free edges, without crossings in the clamps.
+Let go is what tows have slipped past with their ends, parts of a crossing counted."""
 
 
 class StripStiffnessKeys(StiffnessKeys):
@@ -224,7 +228,12 @@ def build(
         return np.tile([0.0, place, 0.0], (len(upper), 1))
 
     shares = case.strip.shares(net.points[net.crossings[:, 0]], case.spacings)
-    crossover = case.crossover.model_copy(update={"slip_limit_N": slip_limit(case)})
+    drag = case.crossover.slip_drag_s_mm
+    slips = {
+        "slip_limit_N": slip_limit(case),
+        "slip_drag_s_mm": SLIP_DRAG * 60.0 / case.rate_mm_min if drag is None else drag,
+    }
+    crossover = case.crossover.model_copy(update=slips)
     return fabric_model(
         case.model_copy(update={"crossover": crossover}),
         net,
@@ -307,12 +316,15 @@ def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
     model = build(case, session)
     pulled = model.net.numbers["nodes"][clamps(model.net, case)[1]]
     seen = of_whole(model, partial(_looking, case))
+    assert model.crossings is not None
+    let_go = model.crossings.let_go
 
     def measure(snapshot: Snapshot) -> dict[str, float]:
         force = float(model.reactions_at(pulled)[:, 1].sum())
         return {
             "displacement_mm": crosshead(case, snapshot.time),
             "force_N": float(model.comm.allreduce(force)),
+            "crossings_let_go": let_go(),
             **seen(snapshot),
         }
 
@@ -337,6 +349,7 @@ def run(case: BiasExtensionCase, session: Session) -> dict[str, Any]:
             "largest_shear_angle_deg": float(columns["shear_angle_deg"].max()),
             "waist_mm": last["waist_mm"],
             "largest_slip_mm": last["largest_slip_mm"],
+            "crossings_let_go": last["crossings_let_go"],
             "largest_out_of_plane_mm": max(r["largest_out_of_plane_mm"] for r in outcome.rows),
         }
         net = model.disc.whole_net(to=0) if session.pictures else None

@@ -160,6 +160,11 @@ class CrossoverKeys(Keys):
         None,
         description="in-plane force at which crossing tows slip on each other; null: never",
     )
+    slip_drag_s_mm: NotNegative | None = Field(
+        None,
+        description="share by which that rises with each mm/s of slip; by default 0.02 at the "
+        "crosshead's speed in a bias extension, none elsewhere",
+    )
     laws: list[ShearLawKeys] = Field(
         default_factory=list,
         description="further in-plane moments, any of these as often as there are causes",

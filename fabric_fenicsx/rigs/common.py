@@ -174,6 +174,7 @@ def crossover_law(
         alignment=keys.alignment_N_mm,
         laws=(*(law.build(area) for law in keys.laws), *(law(area) for law in more)),
         slip_limit=keys.slip_limit_N,
+        slip_drag=keys.slip_drag_s_mm or 0.0,
     )
 
 

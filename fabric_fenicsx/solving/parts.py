@@ -12,6 +12,7 @@ from ufl import variable
 
 from .. import _dolfinx
 from .._dolfinx import Function
+from ..fabric.crossings import spans
 from ..mechanics import crossover, slip
 from ..mechanics.laws.dashpots import LinearDashpot
 from ..mechanics.laws.law import Crossing, CrossingLaw
@@ -38,6 +39,7 @@ class CrossoverLaw:
         laws: further in-plane moments, see mechanics.laws; several of a kind if need be.
         slip_limit: force at which the springs slip in the plane of the sheet [N], see
             mechanics.slip; None: never.
+        slip_drag: share by which that rises with each mm/s of slip [s/mm].
     """
 
     translation: float
@@ -47,6 +49,7 @@ class CrossoverLaw:
     alignment: float
     laws: tuple[CrossingLaw, ...] = ()
     slip_limit: float | None = None
+    slip_drag: float = 0.0
 
 
 class Crossings:
@@ -68,7 +71,7 @@ class Crossings:
         )
         fields = disc.connectors
         if fields is None:
-            self._without_crossings([label for label, _ in turning], histories)
+            self._without_crossings([label for label, _ in turning], law.slip_limit, histories)
             return
 
         def number(value: Any) -> Any:
@@ -86,10 +89,8 @@ class Crossings:
             ("shear angle", gamma_n, gamma),
             ("shear angle before", before, gamma_n),
         ]
-        self.terms = [
-            self._springs(law, number, remembered),
-            crossover.alignment_term(fields, number(law.alignment)),
-        ]
+        springs, slipping = self._springs(law, number, gamma, remembered)
+        self.terms = [springs, crossover.alignment_term(fields, number(law.alignment))]
         moments = []
         for label, piece in turning:
             memory: dict[str, Function] = {}
@@ -109,32 +110,64 @@ class Crossings:
             )
             for name, value in piece.history(at).items():
                 remembered.append((f"{label}: {name}", past(name), value))
+        held: Any = 1.0
+        if slipping is not None:
+            held = slipping.held
+            self.terms = [slipping.let_go(term) for term in self.terms]
+            drag = slipping.adrift(gamma_n)
+            self.terms.append(
+                crossover.turning_term("crossings let go", fields, drag, gamma, change, share=1.0)
+            )
         self._remember(histories, remembered)
         self._angle = self._compiled(gamma)
-        self._moment = self._compiled(sum(moments))
+        self._moment = self._compiled(held * sum(moments))
+        self._held = None if slipping is None else self._compiled(held)
 
     def _springs(
-        self, law: CrossoverLaw, number: Any, remembered: list[tuple[str, Any, Any]]
-    ) -> Term:
-        """The translational springs; what they remember goes on the list."""
+        self,
+        law: CrossoverLaw,
+        number: Any,
+        gamma: Any,
+        remembered: list[tuple[str, Any, Any]],
+    ) -> tuple[Term, slip.SlippingSprings | None]:
+        """The translational springs, and if they slip what does; memories go on the list."""
         name, fields, k = "translation springs", self.disc.connectors, number(law.translation)
         assert fields is not None
         if self.slip_limit is None:
-            return energy_term(name, fields, crossover.opening_energy(fields, k))
+            return energy_term(name, fields, crossover.opening_energy(fields, k)), None
         slip_n = (Function(self._space), Function(self._space))
-        springs = slip.SlippingSprings(fields, k, self.slip_limit, slip_n)
+        four = _dolfinx.constants_per_cell(fields.mesh, 4)
+        lengths = [self.disc.crossing_field(four, spans(self.disc.net, side)) for side in (0, 1)]
+        held, before = Function(self._space), Function(self._space)
+        held.x.array[:] = before.x.array[:] = 1.0
+        springs = slip.SlippingSprings(
+            fields,
+            k,
+            self.slip_limit,
+            slip_n,
+            held,
+            before,
+            gamma,
+            lengths,
+            number(law.slip_drag) * self.per_time,
+        )
         for direction, past, new in zip(("along", "across"), slip_n, springs.slip(), strict=True):
             remembered.append((f"slip {direction} the warp", past, new))
-        return springs.term(name)
+        remembered += [("share held", held, springs.left()), ("share held before", before, held)]
+        return springs.term(name), springs
 
-    def _without_crossings(self, turning: Sequence[str], histories: Histories) -> None:
+    def _without_crossings(
+        self, turning: Sequence[str], limit: float | None, histories: Histories
+    ) -> None:
         """The same collective calls on a rank that has no crossing of its own."""
         self.slip_limit = None
         names = ["translation springs", "normal alignment", *turning]
+        names += [] if limit is None else ["crossings let go"]
         self.terms = [Term(name, "crossovers", None, None) for name in names]
         self._remember(histories, [])
         self._angle = self._compiled(None)
         self._moment = self._compiled(None)
+        self._held = None if limit is None else self._compiled(None)
 
     def _remember(self, histories: Histories, own: list[tuple[str, Any, Any]]) -> None:
         """Hand over the memories; a rank without crossings learns their names from the others."""
@@ -171,6 +204,16 @@ class Crossings:
     def own_moments(self) -> Array:
         """Moment between the tows of each of this rank's crossings [N mm]."""
         return self._evaluated(self._moment)
+
+    def let_go(self) -> float:
+        """How many crossings have slipped off their tows' ends, parts of one counted. Collective.
+
+        0 where none slips; as it was when the last step began.
+        """
+        if self._held is None:
+            return 0.0
+        own = self._evaluated(self._held)
+        return float(self.disc.comm.allreduce(float(np.sum(1.0 - own))))
 
     def _evaluated(self, form: Any) -> Array:
         if form is None:
