@@ -405,6 +405,24 @@ def test_a_strip_that_is_handled_changes_from_run_to_run(term, made):
         assert last * bend == pytest.approx(4e-4, rel=0.02)
 
 
+def test_a_picture_may_be_larger_for_long_overhangs():
+    """A camera that is moved back: places and heights by one share, from one overhang on."""
+    ranges = {"length": 200.0, "curvature": 0.01, "x": 100.0, "z": 90.0, "overhangs": 5}
+    found = {term.name: term for term in terms(ranges, ())}["reading_of_length"]
+    forms = {form.label: form for form in found.variants}
+    assert {"scale, step", "picture, linear", "picture, step"} <= set(forms)
+    values = {
+        f"reading_of_length_{key}": value
+        for key, value in {"1": 0.05, "place": 0.6, "width": 0.01}.items()
+    }
+    for length, share in ((80.0, 0.0), (180.0, 0.05)):
+        at = {"x": 70.0, "z": -30.0, "length": length}
+        moved = [float(as_ufl(v)) for v in forms["picture, step"].camera(values, at)]
+        assert moved == pytest.approx([70.0 * share, -30.0 * share], abs=1e-6)
+        moved = [float(as_ufl(v)) for v in forms["scale, step"].camera(values, at)]
+        assert moved == pytest.approx([0.0, -30.0 * share], abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("overhangs", "labels"),
     [

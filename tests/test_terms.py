@@ -102,8 +102,12 @@ def test_memories_fade():
         ("periodic", (0.4, -0.6), {"width": 0.3}),
         ("periodic", (0.4, -0.6, 0.2, 0.1), {"width": 0.3}),
         ("bump", (0.4, -0.6), {"place": 0.4, "width": 0.1}),
+        ("peak", (0.4,), {"place": 0.3, "width": 0.5}),
+        ("pulse", (0.4,), {"place": 0.4, "width": 0.1}),
         ("sign", (0.4,), {"width": 1e-3}),
         ("sides", (0.4, -0.6), {}),
+        ("saturating sides", (0.4, -0.6), {"width": 0.2}),
+        ("power sides", (0.4, -0.6), {"width": 0.5}),
     ],
 )
 def test_shapes_begin_at_nothing_and_are_smooth(kind, coefficients, numbers):
@@ -567,6 +571,32 @@ def test_each_side_of_nothing_has_a_slope_of_its_own():
     assert value == pytest.approx(np.where(x > 0.0, 4.0 * x, 2.0 * x))
     table = pd.DataFrame({"force_N": shape.reach * x, "reading_N": value, "std_reading_N": 1e-4})
     assert _shortest(table) == "(0.8 force above 0, 0.4 force below)"
+
+
+@pytest.mark.parametrize(
+    ("label", "width", "of", "formula"),
+    [
+        ("power", 0.5, lambda x: np.sqrt(x), "times (|force|/5 N)^0.5"),
+        ("saturation", 0.2, lambda x: 1.0 - np.exp(-x / 0.2), "times (1 − exp(−|force|/1 N))"),
+    ],
+)
+def test_one_side_of_nothing_may_bend_by_itself(label, width, of, formula):
+    """What is so on one side alone, as of a guide that rubs on the way back."""
+    both = {t.name: t for t in terms(RANGES, {"force": (-0.5, 1.0)})}
+    forms = {v.label: v for v in both["reading_of_force"].variants}
+    # Those of one side go on without end on the other.
+    assert not {"saturation", "logarithm"} & set(forms)
+    variant = forms[f"each side its own, {label}"]
+    names = [p.name for p in variant.parameters]
+    x = np.linspace(-0.5, 1.0, 31)
+    own = dict(zip(names, (0.0, -3.0, width), strict=True))
+    value = [float(as_ufl(variant.shape.value(own, as_ufl(float(one))))) for one in x]
+    expected = np.where(x < 0.0, -3.0 * of(np.abs(x)), 0.0)
+    assert value == pytest.approx(expected, abs=4e-3)
+    table = pd.DataFrame(
+        {"force_N": variant.shape.reach * x, "reading_N": value, "std_reading_N": 1e-3}
+    )
+    assert formula in _shortest(table) and "-3 below" in _shortest(table)
 
 
 def test_a_product_has_a_formula_of_each():

@@ -366,6 +366,9 @@ class Search:
 
     def _chosen(self, levels: Sequence[Sequence[Model]]) -> Model:
         """The model of fewest effects that no other beats decisively, if it bears scrutiny."""
+        if self.experiment.curves_only and self.judge.settled(levels[0][0], levels[0][0]):
+            # Another curve would be no finding, and its lead turns with the last digits read.
+            return levels[0][0]
         for count, level in enumerate(levels):
             more = [m.criterion for other in levels[count + 1 :] for m in other]
             beaten = min(more, default=float("inf")) < level[0].criterion - CRITERIA.decisive

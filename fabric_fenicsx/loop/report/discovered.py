@@ -27,6 +27,8 @@ POINTS = 101
 STEP = 5
 #: A formula may be off by this many standard errors of the shape, or by this share of its range.
 SIGMAS, SHARE = 2.0, 0.03
+#: Share of the range below which a place is none.
+LEAST = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +146,31 @@ def _formulas(v: str, unit: str, reach: float) -> Iterator[_Formula]:
         lambda a, b, w: f"{a:.3g} s(({v} − {at(b)})/{at(w)}), s(y) = 1/(1 + exp(−y))",
     )
     yield _Formula(
+        lambda x, a, b, w: a * np.exp(-((np.log(np.maximum(x, LEAST) / b) / w) ** 2)),
+        ((1.0, 0.1, 0.5), (1.0, 0.4, 0.5)),
+        lambda a, b, w: f"{a:.3g} exp(−(ln({v}/{at(b)})/{abs(w):.3g})²)",
+    )
+    yield _Formula(
+        lambda x, a, b, w: np.where(x > b, a * np.exp(-(x - b) / w), 0.0),
+        tuple((1.0, b, 0.1) for b in (0.1, 0.3, 0.5, 0.7, 0.9)),
+        lambda a, b, w: f"{a:.3g} exp(−({v} − {at(b)})/{at(w)}) from {at(b)} on",
+    )
+    yield _Formula(
+        lambda x, a, w: a * np.tanh(x / w),
+        ((1.0, 0.03), (1.0, 0.2)),
+        lambda a, w: f"{a:.3g} tanh({v}/{at(w)})",
+    )
+    yield _Formula(
+        lambda x, a, b, n: _of_sides(x, a, b) * np.abs(x) ** n,
+        ((1.0, 0.5, 0.5), (1.0, 0.5, 2.0)),
+        lambda a, b, n: f"{a:.3g} above 0, {b:.3g} below, times (|{v}|/{at(1.0)})^{n:.3g}",
+    )
+    yield _Formula(
+        lambda x, a, b, w: _of_sides(x, a, b) * (1.0 - np.exp(-np.abs(x) / w)),
+        ((1.0, 0.5, 0.1), (1.0, 0.5, 0.3)),
+        lambda a, b, w: f"{a:.3g} above 0, {b:.3g} below, times (1 − exp(−|{v}|/{at(w)}))",
+    )
+    yield _Formula(
         lambda x, a, b, w: a * (np.exp(-(((x - b) / w) ** 2)) - np.exp(-((b / w) ** 2))),
         ((1.0, 0.3, 0.1), (1.0, 0.6, 0.1)),
         lambda a, b, w: f"{a:.3g} {_bump(f'{v} − {at(b)}', at(abs(w)), np.exp(-((b / w) ** 2)))}",
@@ -153,6 +180,11 @@ def _formulas(v: str, unit: str, reach: float) -> Iterator[_Formula]:
         tuple((1.0, 0.1, n) for n in np.arange(1.0, 16.0, 0.25)),
         lambda a, b, n: _wave(np.hypot(a, b), f"{v}/{at(1.0 / n)}", np.arctan2(b, a)),
     )
+
+
+def _of_sides(x: Array, above: float, below: float) -> Array:
+    """One number above 0 and another one below."""
+    return np.where(x > 0.0, above, below)
 
 
 def _wave(size: float, turns: str, phase: float) -> str:

@@ -22,9 +22,11 @@ PARAMETER_UNITS = {
     "rad_s": "rad/s",
     "rad": "rad",
     "N_s": "N s",
+    "mm_s2": "mm/s²",
+    "mm_s": "mm/s",
 }
-OTHER_UNITS = {"drift_N_s": "N/s"}
-"""A drift's unit is written like a dashpot's."""
+OTHER_UNITS = {"drift_N_s": "N/s", "force_rate_N_s": "N/s"}
+"""These are written like a dashpot's."""
 
 #: Scatter of specimens below which the headline does not name it. Convention.
 SMALL_SCATTER = 0.02

@@ -31,7 +31,16 @@ Variable = Literal[
 ]
 AtHand = Literal["angle", "rate"]
 Kind = Literal[
-    "spline", "graded", "step", "saturation", "hyperbola", "logarithm", "periodic", "bump"
+    "spline",
+    "graded",
+    "step",
+    "saturation",
+    "hyperbola",
+    "logarithm",
+    "periodic",
+    "bump",
+    "peak",
+    "pulse",
 ]
 Base = Literal[
     "elastic",
@@ -125,6 +134,9 @@ GRADED = (0.05, 0.1, 0.2, 0.4)
 OF_ELASTIC = ("elastic", "rest")
 """Bases made of the spring's moment, whose numbers are no moments per area."""
 
+ONSET = 0.005
+"""Half of what a pulse takes to begin, as a share of the range."""
+
 LEAST = 1e-6
 """Largest angle below which none is relative to it [rad]."""
 
@@ -161,8 +173,12 @@ def shape_of(
             c / (1 + exp(−(x − x₀)/w)); "saturation", c (1 − exp(−x/w)); "hyperbola",
             c x / (|x| + w); "logarithm", c ln(1 + x/w); "periodic",
             c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1), and overtones;
-            "bump", (c₁ + c₂ y) e^(−y²) with y = (x − x₀)/w, less what that is at 0;
-            "sign", c tanh(x/w); "sides", c₁ x + c₂ |x|, each side of 0 with a slope of its own.
+            "bump", (c₁ + c₂ y) e^(−y²) with y = (x − x₀)/w, less what that is at 0; "peak",
+            c e^(−y²) with y = ln(x/x₀)/w; "pulse", c e^(−(x − x₀)/w) from x₀ on, where it begins
+            within ONSET;
+            "sign", c tanh(x/w); "sides", c₁ x + c₂ |x|, each side of 0 with a slope of its own;
+            "saturating sides", c₁ f(x) for x > 0 and c₂ f(−x) for x < 0 with f of a saturation, and
+            "power sides" with |x|^w.
         coefficients: c or c_k.
         x: where.
         place: x₀ of a step or a bump.
@@ -187,10 +203,21 @@ def shape_of(
         return sum(a * sin(turn) + b * (cos(turn) - 1) for a, b, turn in pairs)
     if kind == "bump":
         return _bump(c, (x - place) / width) - _bump(c, -place / width)
+    if kind == "peak":
+        return c[0] * exp(-((ln(max_value(x, LEAST) / place) / width) ** 2))
+    if kind == "pulse":
+        past = x - place
+        return c[0] * exp(-max_value(past, 0) / width) * (1 + tanh(past / ONSET)) / 2
     if kind == "sign":
         return c[0] * tanh(x / width)
     if kind == "sides":
         return c[0] * x + c[1] * size_of(x)
+    if kind in ("saturating sides", "power sides"):
+        sides = (max_value(x, 0), max_value(-x, 0))
+        if kind == "power sides":
+            return sum(c_k * _power(side, width) for c_k, side in zip(c, sides, strict=True))
+        each_side = zip(c, sides, strict=True)
+        return sum(shape_of("saturation", (c_k,), side, width=width) for c_k, side in each_side)
     pieces = max(len(c) - 1, 1)
     low, high = ends
     even = [low + (high - low) * k / pieces for k in range(1, pieces)]
@@ -198,6 +225,11 @@ def shape_of(
     for c_k, knot in zip(c[2:], GRADED if kind == "graded" else even, strict=True):
         value = value + c_k * max_value(knot - x if knot < 0.0 else x - knot, 0) ** 2
     return value
+
+
+def _power(x: Any, exponent: Any) -> Any:
+    """The power of an x that is not negative, of finite slope at 0."""
+    return (x + LEAST) ** exponent - LEAST**exponent
 
 
 def _bump(c: Any, y: Any) -> Any:

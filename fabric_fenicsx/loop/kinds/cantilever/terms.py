@@ -267,8 +267,10 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     def form(label: str, parameters: tuple[Parameter, ...], of: Of, by: str, to: str) -> Any:
         most = {"x": width, "z": depth, "length": longest}[by]
         # What is added to a height is a factor of it, or so many times the deepest one.
-        unit = None if to == "scale" else depth
+        unit = depth if to == "height" else None
         camera = partial(_higher, of, by, most, unit)
+        if to == "picture":
+            camera = partial(_larger, of, by, most)
         # In a table they stand beside each other.
         y = "share_of_height" if unit is None else "added_height_mm" if by == "z" else X["z"]
         shape = Shape(X[by], y, most, partial(times, unit or 1.0, of))
@@ -303,14 +305,16 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     about = "scale of the picture by the distance from the clamp in it"
     yield strip_effect(name, about, "reading", ("height", "distance"), forms)
 
-    name = "reading_of_length"
+    name, count = "reading_of_length", ranges.get("overhangs", 0.0)
     forms = [form(*shape, "length", "scale") for shape in splines(name, SPLINES)]
+    several = [*over_overhangs(name, count)]
+    forms += [form(*shape, "length", "scale") for shape in several if shape[0] == "step"]
+    forms += [form(*shape, "length", "picture") for shape in several]
     # Nobody knows where a camera that moves with the overhang has its zero.
-    by_overhang = over_overhangs(name, ranges.get("overhangs", 0.0), constant=True)
+    by_overhang = over_overhangs(name, count, constant=True)
     forms += [form(*shape, "length", "height") for shape in by_overhang]
-    yield strip_effect(
-        name, "heights, or their scale, by the overhang", "reading", ("length",), forms
-    )
+    about = "heights, or their scale or the picture's, by the overhang"
+    yield strip_effect(name, about, "reading", ("length",), forms)
 
 
 def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
@@ -367,6 +371,11 @@ def _higher(
 ) -> tuple[Any, Any]:
     added = g(p, min_value(abs(at[by]) / most, 1))
     return 0.0, added * (at["z"] if unit is None else unit)
+
+
+def _larger(g: Of, by: str, most: float, p: Values, at: Values) -> tuple[Any, Any]:
+    added = g(p, min_value(at[by] / most, 1))
+    return added * at["x"], added * at["z"]
 
 
 def _radial(names: tuple[str, str], longest: float, p: Values, at: Values) -> tuple[Any, Any]:

@@ -13,15 +13,33 @@ from ....inputs.parameters import Parameter
 from ....mechanics.laws.law import size_of
 from ....mechanics.laws.shaped import recent, shape_of
 from ...inference.effects import Effect, Shape, Values, valued
-from .shapes import Ends, X, Y, bumps, factor, fitted, memory_of, over, shapes, waves, wealth
+from .shapes import (
+    Ends,
+    X,
+    Y,
+    both_sides,
+    bumps,
+    factor,
+    fitted,
+    memory_of,
+    over,
+    pulses,
+    shapes,
+    waves,
+    wealth,
+)
 from .variant import FrameVariant
 
 __all__ = ["RIG_VARIABLES", "RigVariable", "of_the_rig", "rig_term", "rig_terms"]
 
 #: Most cycles over the range that a periodic term is looked for with.
 CYCLES = {"time": 40.0, "displacement": 16.0}
+#: ... in time with overtones: more of them follow what is read too seldom.
+SWITCHED = 8.0
 #: Share of the largest speed below which its sign is rounded.
 SLOW = 1e-3
+#: ... and where a larger one is looked for, as a share of the speed.
+ROUNDED = (0.03, 0.2)
 #: Memories of what lags, as shares of the longest run: a filter's are short.
 LAGS = (0.003, 0.01, 0.05, 0.2)
 #: Ways over which a play is taken up, as shares of the largest displacement.
@@ -205,10 +223,9 @@ def _forms(
     )
     shapes_of = list(drawn)
     if between[0] < 0.0 < between[1] and variable not in LINES and not gain:
-        sides = tuple(Parameter(f"{name}_{k}", amplitude=True) for k in ("odd", "even"))
-        shapes_of.append(
-            ("each side its own", {"shape": "sides", "coefficients": sides} | _zero(name, turning))
-        )
+        # Those are of one side.
+        shapes_of = [drawn for drawn in shapes_of if drawn[0] not in ("saturation", "logarithm")]
+        shapes_of += [(label, own | _zero(name, turning)) for label, own in both_sides(name)]
     for label, own in shapes_of:
         if own["shape"] == "spline":
             own |= {"ends": between}
@@ -329,7 +346,9 @@ def _gains(name: str, variable: str, reach: float) -> Iterator[tuple[str, dict[s
     if variable in CYCLES:
         # In time nothing need be a sine: what is switched is not.
         overtones = (0, 2) if variable == "time" else (0,)
-        drawn = *waves(name, CYCLES[variable], overtones), *bumps(name)
+        drawn = [*waves(name, CYCLES[variable], overtones), *bumps(name)]
+        if variable == "time":
+            drawn += pulses(name)
         for label, coefficients, numbers in drawn:
             yield label, numbers | {"coefficients": coefficients}
 
@@ -372,6 +391,9 @@ def _added(
     if variable == "speed":
         yield "sign", {"shape": "sign", "coefficients": one, "width": SLOW}
         if name.startswith("travel"):
+            # A drive trails the less the slower it goes.
+            rounded = Parameter(f"{name}_width", ROUNDED, SLOW, 2.0)
+            yield "rounded sign", {"shape": "sign", "coefficients": one, "width": rounded}
             return
     constant = _zero(name, turning)
     # Of an acceleration there are few readings.
@@ -384,5 +406,8 @@ def _added(
             yield label, numbers | {"coefficients": coefficients} | constant
         # Where a run begins a wave may be anywhere.
         zero = {"constant": Parameter(f"{name}_0", amplitude=True)}
-        for label, coefficients, numbers in waves(name, CYCLES[variable]):
+        drawn = [*waves(name, CYCLES[variable])]
+        if variable == "time":
+            drawn += [*waves(name, SWITCHED, (2,)), *pulses(name)]
+        for label, coefficients, numbers in drawn:
             yield label, numbers | {"coefficients": coefficients} | zero

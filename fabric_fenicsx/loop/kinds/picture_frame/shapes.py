@@ -20,6 +20,7 @@ __all__ = [
     "Ends",
     "X",
     "Y",
+    "both_sides",
     "bumps",
     "factor",
     "fitted",
@@ -28,6 +29,7 @@ __all__ = [
     "over",
     "over_runs",
     "product",
+    "pulses",
     "remembered_since",
     "shapes",
     "waves",
@@ -53,12 +55,22 @@ BUMPS, BUMP_WIDTHS = tuple((0.05 + 0.1 * np.arange(10)).tolist()), (0.03, 0.12)
 DECAYS = (0.1, 0.3)
 #: Where a logarithm bends over, or a hyperbola is half of what it ends at, as shares of it.
 BENDS = (0.01, 0.1)
+#: Likewise of what rises and falls again, whose width is that of a logarithm.
+TOPS, TOP_WIDTHS = (0.05, 0.15, 0.4, 0.7), (0.5,)
+#: Decays of what begins somewhere.
+FADING = (0.05, 0.2)
 #: Steps of how many cycles a wave is looked for with: closer together two are alike.
 STEP = 0.5
 #: Coefficients of a product; more of them, and other data are foretold by what cancels in these.
 MOST = 10
 #: Memories, as shares of the longest run.
 MEMORIES = (0.01, 0.05, 0.2)
+
+EXPONENTS = (0.5, 2.0)
+"""Where that of a power is looked for from."""
+
+SIDED = (("odd", "even"), ("above", "below"))
+"""Coefficients of what differs on either side of nothing: what both have, or each."""
 
 SQUARES = ("recent_square_of_angle", "recent_square_of_rate")
 """Of these what heat or a bed takes up: a product is in proportion to it."""
@@ -212,6 +224,9 @@ def shapes(name: str, wealth: int) -> Iterator[Drawn]:
         yield "logarithm", one, {"shape": "logarithm", "width": bend}
         half = Parameter(f"{name}_half", BENDS, 1e-3, 1.0)
         yield "hyperbola", one, {"shape": "hyperbola", "width": half}
+        top = Parameter(f"{name}_top", TOPS, 0.01, 1.0)
+        wide = Parameter(f"{name}_wide", TOP_WIDTHS, 0.2, 2.0)
+        yield "peak", one, {"shape": "peak", "place": top, "width": wide}
 
 
 def waves(name: str, most: float, overtones: Sequence[int] = (0,)) -> Iterator[Drawn]:
@@ -241,6 +256,38 @@ def bumps(name: str, ends: tuple[float, float] = (0.0, 1.0)) -> Iterator[Drawn]:
     place = Parameter(f"{name}_place", places, low, high)
     width = Parameter(f"{name}_width", BUMP_WIDTHS, 0.005, 0.5)
     yield "bump", own, {"shape": "bump", "place": place, "width": width}
+
+
+def pulses(name: str) -> Iterator[Drawn]:
+    """What begins somewhere and fades: as shapes."""
+    one = (Parameter(f"{name}_1", amplitude=True),)
+    place = Parameter(f"{name}_place", BUMPS, 0.0, 1.0)
+    fading = Parameter(f"{name}_fading", FADING, 0.01, 1.0)
+    yield "pulse", one, {"shape": "pulse", "place": place, "width": fading}
+
+
+def both_sides(name: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """What is otherwise on the other side of nothing: label and numbers."""
+    of = [tuple(Parameter(f"{name}_{k}", amplitude=True) for k in two) for two in SIDED]
+    yield "each side its own", {"shape": "sides", "coefficients": of[0]}
+    decay = Parameter(f"{name}_decay", DECAYS, 0.01, 2.0)
+    yield (
+        "each side its own, saturation",
+        {
+            "shape": "saturating sides",
+            "coefficients": of[1],
+            "width": decay,
+        },
+    )
+    exponent = Parameter(f"{name}_exponent", EXPONENTS, 0.1, 4.0)
+    yield (
+        "each side its own, power",
+        {
+            "shape": "power sides",
+            "coefficients": of[1],
+            "width": exponent,
+        },
+    )
 
 
 def over(variable: str, name: str, wealth: int, reach: float) -> Iterator[Drawn]:

@@ -29,6 +29,7 @@ from .shapes import (
     factor,
     fitted,
     memory_of,
+    pulses,
     remembered_since,
     shapes,
     waves,
@@ -270,6 +271,8 @@ def _laws(
     drawn = [*shapes(name, wealth(base, variable))]
     if (base, variable) in FINE:
         drawn += bumps(name)
+    if variable == "time":
+        drawn += pulses(name)
     if (base, variable) in CYCLES:
         drawn += waves(name, CYCLES[base, variable], OVERTONES.get(variable, (0,)))
     for label, coefficients, numbers in drawn:
