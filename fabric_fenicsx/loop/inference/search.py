@@ -4,7 +4,7 @@ First the effects with a name. Where none of them accounts for the fitted readin
 with terms without a formula beside them: what acts on what, and by what does it go? Where a single
 one does, such terms may be its rivals (see Experiment.terms_are_rivals), and are where readings
 would have to scatter by more than was stated or go together for long, or specimens to differ that
-were each tested in a way of their own. Before several effects with
+were each tested in a way of their own or differ unusually in the effect itself. Before several effects with
 a name are fitted together a single term is looked for: if it leaves noise, and they far more, they
 are not.
 """
@@ -17,6 +17,7 @@ from .criteria import CRITERIA
 from .diagnosis import Diagnosis
 from .effects import Effect
 from .experiment import Experiment
+from .fitting import groups_of
 from .judge import Model
 from .one_search import Search
 from .rivals import near, nearest_forms
@@ -59,7 +60,8 @@ def diagnose_test(
     own = [effect.name for effect in found.effects]
     alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
     in_its_way = experiment.each_its_own_way and search.specimens_differ
-    rivals = bool(own) and (experiment.terms_are_rivals or in_its_way or _at_the_edge(found))
+    doubtful = in_its_way or _at_the_edge(found) or _uneven(found)
+    rivals = bool(own) and (experiment.terms_are_rivals or doubtful)
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
         least = -CRITERIA.decisive
@@ -106,6 +108,18 @@ def _at_the_edge(found: Diagnosis) -> bool:
     """
     free = {p.name for v in found.final.variants for p in v.parameters if not p.amplitude}
     return bool(free & set(found.final.at_bound))
+
+
+def _uneven(found: Diagnosis) -> bool:
+    """Whether an effect that was found is unusually different in each specimen.
+
+    It may go by something that specimens differ in.
+    """
+    usual = CRITERIA.significant * CRITERIA.usual_scatter
+    own = groups_of(found.experiment, found.final.variants).keys()
+    own -= {p.name for p in found.experiment.baseline}
+    scatter = found.final.variances.scatter
+    return any(scatter.get(group, 0.0) > usual for group in own)
 
 
 def _beside(further: Diagnosis, found: Diagnosis) -> Diagnosis:
