@@ -502,9 +502,9 @@ by any model of the tables: what all of them miss alike is in none of these erro
 SLIP = """The strip of {size} with `crossover_slip` alone, and where its crossings slipped:"""
 
 REPORTED = """That yarns of woven strips slip above some 35 to 40 degrees, first at the borders of
-the zones, is commonly said, and slippage is one of the two ways in which the test's usual assumptions
-fail (reviewed by Boisse et al., Int. J. Mater. Form. 10, 2017, 473). No measurement of where it sets
-in is cited here, and it is no check of the model."""
+the zones, is commonly said, and slippage is one of the two ways in which the test's usual
+assumptions fail (reviewed by Boisse et al., Int. J. Mater. Form. 10, 2017, 473). No measurement of
+where it sets in is cited here, and it is no check of the model."""
 
 
 def main() -> None:

@@ -226,6 +226,33 @@ def test_a_form_at_the_edge_may_stand_for_another_law(bound, rivals):
 
 
 @pytest.mark.parametrize(
+    ("lots", "found"), [((1.0, 0.2), "round"), ((1.0, 0.9), "bend")], ids=["far apart", "alike"]
+)
+def test_an_effect_that_differs_in_each_specimen_may_go_by_something(lots, found):
+    """A term that does with one number takes its place; where they are alike none is tried."""
+    test = curved("bend", 0.0)
+    size = np.array(lots)[test.readings.run % 2]
+    test.columns["round_size"] = size * test.columns["bend_size"]
+    observed = test.readings.observed + 60.0 * SIGMA * test.columns["round_size"]
+    test.readings = replace(test.readings, observed=observed)
+    said = diagnose_test(test)
+    assert [e.name for e in said.effects] == [found]
+    tried = {c.effect.name for c in said.candidates if c.fit is not None}
+    assert ("round" in tried) is (found == "round")
+
+
+@pytest.mark.parametrize(("curve", "verdict"), [(False, "effect_found"), (True, "no_effect")])
+def test_of_a_curve_alone_another_one_is_no_finding(curve, verdict):
+    """As long as the baseline leaves noise without structure, whichever curve is ahead."""
+    test = curved("bend", 5.0)
+    test.curves_only = curve
+    assert diagnose_test(test).verdict == verdict
+    clear = curved("bend", 80.0)
+    clear.curves_only = curve
+    assert diagnose_test(clear).verdict == ("unexplained" if curve else "effect_found")
+
+
+@pytest.mark.parametrize(
     ("acts_on", "correlation", "settled"),
     [("", 0.3, True), ("", 0.9, True), ("moment", 0.3, True), ("moment", 0.7, False)],
 )

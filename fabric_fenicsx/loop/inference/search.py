@@ -4,9 +4,9 @@ First the effects with a name. Where none of them accounts for the fitted readin
 with terms without a formula beside them: what acts on what, and by what does it go? Where a single
 one does, such terms may be its rivals (see Experiment.terms_are_rivals), and are where readings
 would have to scatter by more than was stated or go together for long, or specimens to differ that
-were each tested in a way of their own or differ unusually in the effect itself. Before several effects with
-a name are fitted together a single term is looked for: if it leaves noise, and they far more, they
-are not.
+were each tested in a way of their own, or unusually in the effect itself. Before several effects
+with a name are fitted together a single term is looked for: if it leaves noise, and they far more,
+they are not.
 """
 
 from __future__ import annotations
@@ -116,8 +116,8 @@ def _uneven(found: Diagnosis) -> bool:
     It may go by something that specimens differ in.
     """
     usual = CRITERIA.significant * CRITERIA.usual_scatter
-    own = groups_of(found.experiment, found.final.variants).keys()
-    own -= {p.name for p in found.experiment.baseline}
+    groups = groups_of(found.experiment, found.final.variants)
+    own = set(groups) - {p.name for p in found.experiment.baseline}
     scatter = found.final.variances.scatter
     return any(scatter.get(group, 0.0) > usual for group in own)
 
