@@ -4,7 +4,7 @@ One is a place along the strip, or a place or a height in the picture, and enter
 the other, the run or the overhang, there is a shape g as of terms over one variable:
 
     (x, z) + g (−z, x),  z + x g,  z (1 + g)    what the camera sees
-    κ0 = s g,  w (1 + s g)                      the curvature of the unloaded strip, and its weight
+    κ0 = s g,  w (1 + s g),  M = B κ e^(−s g)   what acts on the strip, or with e^(−s/r) for s
 
 What acts on the strip is for where no term over one variable will do. What the camera does is
 looked at with these: a zero of each run, which has as many numbers as there are runs, may otherwise
@@ -17,6 +17,9 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
+from ufl import exp
+
+from ....inputs.parameters import Parameter
 from ...inference.effects import Effect, Shape, Values
 from ..records import FEWEST_BEFORE
 from .shapes import SPLINES, Drawn, Of, by_turns, over_runs, splines
@@ -25,6 +28,8 @@ from .variant import StripVariant
 
 __all__ = ["products"]
 
+#: Where r is looked for, as shares of the longest strip.
+REACHES = (0.1, 0.3)
 CALLED = {"run": "run", "length": "overhang"}
 """Variables in words."""
 
@@ -52,21 +57,30 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
     ]
     about = "scale of heights that changes from run to run"
     yield strip_effect(name, about, "reading", ("height", "run"), forms)
-    for acts_on, unit, what in on_the_strip(ranges):
+    moment = ("bending_moment", 1.0, "bending stiffness")
+    for acts_on, unit, what in (moment, *on_the_strip(ranges)):
         name = f"{acts_on}_of_arc_length_and_run"
         forms = [
             strip_form(
-                label,
-                parameters,
-                # At the end of the longest strip.
+                label + words,
+                (*parameters, *more),
+                # At the end of the longest strip, or at the clamp.
                 Shape(X["run"], Y[acts_on], last, partial(times, unit, g)),
                 acts_on,
-                partial(_along, unit, g, last, ranges["length"]),
+                partial(_placed, unit, g, last, where),
             )
+            for words, more, where in _places(name, ranges["length"])
             for label, parameters, g in over_runs(name, last)
         ]
         about = f"{what} that changes along the strip and from run to run"
         yield strip_effect(name, about, acts_on, ("arc_length", "run"), forms, of_two=True)
+
+
+def _places(name: str, longest: float) -> Iterator[tuple[str, tuple[Parameter, ...], Of]]:
+    """How much of it there is at an arc length: in words, its own numbers, and the share."""
+    yield "", (), lambda p, s: s / longest
+    reach = Parameter(f"{name}_reach_mm", tuple(share * longest for share in REACHES), 1.0, longest)
+    yield ", at the clamp", (reach,), lambda p, s: exp(-s / p[reach.name])
 
 
 def _turned_by(
@@ -106,5 +120,5 @@ def _scaled(g: Of, by: str, most: float, p: Values, at: Values) -> tuple[Any, An
     return 0.0, of_strip(1.0, g, by, most, p, at) * at["z"]
 
 
-def _along(unit: float, g: Of, last: float, longest: float, p: Values, at: Values) -> Any:
-    return at["s"] / longest * of_strip(unit, g, "run", last, p, at)
+def _placed(unit: float, g: Of, last: float, where: Of, p: Values, at: Values) -> Any:
+    return where(p, at["s"]) * of_strip(unit, g, "run", last, p, at)

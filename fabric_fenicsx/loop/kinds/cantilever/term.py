@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
-from ufl import min_value
+from ufl import exp, min_value
 
 from ....inputs.parameters import Parameter
 from ...inference.effects import Effect, Shape, Values
@@ -19,6 +19,7 @@ __all__ = [
     "form_of_strip",
     "of_strip",
     "on_the_strip",
+    "softer",
     "strip_effect",
     "strip_form",
     "times",
@@ -33,7 +34,11 @@ X = {
     "x": "distance_mm",
     "z": "height_mm",
 }
-Y = {"rest_curvature": "rest_curvature_1_mm", "load": "share_of_weight"}
+Y = {
+    "bending_moment": "log_flexibility",
+    "rest_curvature": "rest_curvature_1_mm",
+    "load": "share_of_weight",
+}
 """Variables and what is added, with units."""
 
 
@@ -67,7 +72,9 @@ def strip_form(
     acts_on: str,
     of: Callable[[Values, Values], Any],
 ) -> StripVariant:
-    """A form that adds to the "load" or to the "rest_curvature"."""
+    """A form that adds to the "load" or the "rest_curvature", or is a moment's log-flexibility."""
+    if acts_on == "bending_moment":
+        return StripVariant(label, parameters, shape=shape, added_moment=partial(_softer_by, of))
     if acts_on == "load":
         return StripVariant(label, parameters, shape=shape, load=of)
     return StripVariant(label, parameters, shape=shape, added_curvature=of)
@@ -99,6 +106,15 @@ def times(unit: float, g: Of, p: Values, x: Any) -> Any:
 def of_strip(unit: float, g: Of, by: str, most: float, p: Values, at: Values) -> Any:
     """Of what is the same all along a strip, its "length" or its "run"."""
     return unit * g(p, min_value(at[by] / most, 1))
+
+
+def softer(log_flexibility: Any, p: Values, at: Values) -> Any:
+    """What a moment changes by where a strip is more flexible."""
+    return p["B"] * at["kappa"] * (exp(-log_flexibility) - 1)
+
+
+def _softer_by(of: Callable[[Values, Values], Any], p: Values, at: Values) -> Any:
+    return softer(of(p, at), p, at)
 
 
 def turned(angle: Any, at: Values) -> tuple[Any, Any]:

@@ -21,7 +21,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from ufl import conditional, exp, lt, max_value, min_value
+from ufl import conditional, lt, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.bending_laws import TabulatedBending
@@ -47,8 +47,8 @@ from .term import (
     X,
     Y,
     form_of_strip,
-    of_strip,
     on_the_strip,
+    softer,
     strip_effect,
     strip_form,
     times,
@@ -227,17 +227,12 @@ def _along(end: str, longest: float, at: Values) -> Any:
 
 
 def _flexible(g: Of, end: str, longest: float, p: Values, at: Values) -> Any:
-    return _softer(_centred(g, end, p, _along(end, longest, at)), p, at)
+    return softer(_centred(g, end, p, _along(end, longest, at)), p, at)
 
 
 def _odd(g: Of, half: str, p: Values, at: Values) -> Any:
     size = abs(at["kappa"])
-    return _softer(g(p, size / (size + p[half])), p, at)
-
-
-def _softer(log_flexibility: Any, p: Values, at: Values) -> Any:
-    """What a moment changes by where a strip is more flexible."""
-    return p["B"] * at["kappa"] * (exp(-log_flexibility) - 1)
+    return softer(g(p, size / (size + p[half])), p, at)
 
 
 def _tabulated(
@@ -324,13 +319,7 @@ def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
         return
     name = "bending_moment_of_run"
     forms = [
-        StripVariant(
-            label,
-            parameters,
-            shape=Shape(X["run"], "log_flexibility", last, g),
-            added_moment=partial(_softened, g, last),
-        )
-        for label, parameters, g in over_runs(name, last)
+        form_of_strip(drawn, "bending_moment", 1.0, "run", last) for drawn in over_runs(name, last)
     ]
     about = "bending stiffness that changes from run to run of a specimen"
     yield strip_effect(name, about, "bending_moment", ("run",), forms)
@@ -342,10 +331,6 @@ def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
         ]
         words = f"{about} that changes from run to run of a specimen"
         yield strip_effect(name, words, acts_on, ("run",), forms)
-
-
-def _softened(g: Of, last: float, p: Values, at: Values) -> Any:
-    return _softer(of_strip(1.0, g, "run", last, p, at), p, at)
 
 
 def _of_the_run(runs: Sequence[int]) -> Iterator[Effect]:
