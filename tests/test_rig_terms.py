@@ -104,6 +104,13 @@ def deaf_cell(t, D, speed):
     return force / (1.0 + np.exp(-(np.abs(force) - 3.0) / 0.4))
 
 
+def loose_weight(t, D, speed):
+    """It presses on the cell as the crosshead is pulled up, as far as readings each second tell."""
+    at = t[::10]
+    pull = np.gradient(np.gradient(D[::10], at), at)
+    return force_of(D, speed) + 0.4 * np.interp(t, at, np.maximum(pull, 0.0))
+
+
 def warming_cell(t, D, speed):
     """It reads up to a fifth more, after 60 s."""
     return force_of(D, speed) * (1.0 + 0.2 * (1.0 - np.exp(-t / 60.0)))
@@ -457,6 +464,7 @@ def test_a_guide_that_sticks_keeps_its_sign():
         (rubbing_guide, "reading_of_force_and_direction", "each side its own, kept in a hold"),
         (deaf_cell, "reading_of_force", "gain, step"),
         (warming_cell, "reading_of_force_and_time", "gain, saturation"),
+        (loose_weight, "reading_of_acceleration", "each side its own, power"),
         (chamber_door, "reading_of_force_and_time", "gain, bump"),
         (swaying_cell, "reading_of_force_and_displacement", "gain, periodic"),
     ],

@@ -88,6 +88,15 @@ def test_memories_fade():
     largest = ShapedLaw("odd", "recent_largest_angle", reach=1.0, coefficients=(1.0,), memory=2.0)
     back = np.concatenate([[0.3], np.zeros(7)])
     assert marched(largest, back)[1] == pytest.approx(0.3 * np.exp(-(t - STEP) / 2.0))
+    # The work of a spring that is drawn out at an even rate and then held.
+    out = np.append(0.2 * t[:4], [0.2 * t[3]] * 4)
+    power = np.append(0.2 * out[:4], np.zeros(4))
+    expected = [0.0]
+    for new in power:
+        left = np.exp(-STEP / 2.0)
+        expected.append(left * expected[-1] + (1.0 - left) * new)
+    work = ShapedLaw("odd", "recent_work", reach=1.0, coefficients=(1.0,), memory=2.0)
+    assert marched(work, out)[1] == pytest.approx(expected[1:])
 
 
 @pytest.mark.parametrize(

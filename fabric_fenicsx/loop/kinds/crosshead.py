@@ -247,7 +247,7 @@ class CrossheadTest:
         change = np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0, prepend=0.0)
         change[0] = 0.0
         force = float(np.abs(self.readings.observed[rows]).max())
-        acceleration = self._recorded.per_second(self._points["D_rate"]).value
+        acceleration = self._recorded.acceleration.value
         return {
             "angle": most(self._gamma),
             "rate": most(self._rate),
@@ -268,6 +268,7 @@ class CrossheadTest:
             "displacement": self._recorded.at_readings(self._points["D"].value)[rows],
             "speed": self._recorded.at_readings(self._points["D_rate"].value)[rows],
             "force": self.readings.observed[rows],
+            "acceleration": self._recorded.at_readings(self._recorded.acceleration.value)[rows],
         }
 
         def ends(values: Array) -> tuple[float, float]:

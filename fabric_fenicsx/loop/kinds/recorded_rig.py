@@ -19,6 +19,9 @@ __all__ = ["RecordedRig"]
 
 Array = npt.NDArray[np.float64]
 
+#: Readings of a run that tell nothing of an acceleration.
+FEWEST = 3
+
 
 class RecordedRig:
     """What a rig did, point by point of its records side by side; see records.laid_out.
@@ -84,7 +87,7 @@ class RecordedRig:
             "time": lambda: self._since_start,
             "displacement": lambda: self.points["D"],
             "speed": lambda: self.points["D_rate"],
-            "acceleration": lambda: self._acceleration,
+            "acceleration": lambda: self.acceleration,
             "force": lambda: force,
             "force_rate": lambda: self.per_second(force),
             "per_time": lambda: self.points["per_time"],
@@ -102,9 +105,22 @@ class RecordedRig:
         return Varying(time - time[0])
 
     @cached_property
-    def _acceleration(self) -> Varying:
-        """Of the crosshead [mm/s²]."""
-        return self.per_second(self.points["D_rate"])
+    def acceleration(self) -> Varying:
+        """Of the crosshead [mm/s²], as its readings tell: differences twice from one to the next.
+
+        Between them nobody knows how sharp a corner is.
+        """
+        place, run = self.place
+        time, D = (self.points[name].value for name in ("time", "D"))
+        found = np.zeros(D.shape)
+        for k in range(D.shape[1]):
+            # Where a record stands still at first, readings may share a point.
+            own = np.unique(place[run == k])
+            t = time[own, k]
+            if len(own) > FEWEST:
+                speed = np.gradient(D[own, k], t)
+                found[:, k] = np.interp(time[:, k], t, np.gradient(speed, t))
+        return Varying(found)
 
     def per_second(self, x: Varying) -> Varying:
         """How fast something changes along each record: differences of second order within it."""

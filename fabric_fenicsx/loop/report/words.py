@@ -18,6 +18,7 @@ PARAMETER_UNITS = {
     "N_mm3": "N mm³",
     "1_mm": "1/mm",
     "rad2_s2": "rad²/s²",
+    "rad2_s": "rad²/s",
     "rad2": "rad²",
     "rad_s": "rad/s",
     "rad": "rad",

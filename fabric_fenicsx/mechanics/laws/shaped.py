@@ -28,6 +28,7 @@ Variable = Literal[
     "recent_rate",
     "recent_square_of_angle",
     "recent_square_of_rate",
+    "recent_work",
 ]
 AtHand = Literal["angle", "rate"]
 Kind = Literal[
@@ -117,6 +118,9 @@ VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
         at.gamma**2, past, at.per_time, memory
     ),
     "recent_square_of_rate": lambda at, past, memory: recent(at.rate**2, past, at.per_time, memory),
+    "recent_work": lambda at, past, memory: recent(
+        size_of(at.gamma * at.rate), past, at.per_time, memory
+    ),
 }
 """What a factor may depend on, from the crossing, its value at the step before, and τ [s].
 

@@ -72,7 +72,7 @@ EXPONENTS = (0.5, 2.0)
 SIDED = (("odd", "even"), ("above", "below"))
 """Coefficients of what differs on either side of nothing: what both have, or each."""
 
-SQUARES = ("recent_square_of_angle", "recent_square_of_rate")
+SQUARES = ("recent_square_of_angle", "recent_square_of_rate", "recent_work")
 """Of these what heat or a bed takes up: a product is in proportion to it."""
 
 FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate", *SQUARES)
@@ -102,6 +102,7 @@ X = {
     "recent_rate": "recent_rate_rad_s",
     "recent_square_of_angle": "recent_square_of_angle_rad2",
     "recent_square_of_rate": "recent_square_of_rate_rad2_s2",
+    "recent_work": "recent_work_rad2_s",
     "unloading": "unloading",
     "time": "time_s",
     "displacement": "displacement_mm",

@@ -90,6 +90,7 @@ def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
     largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
     largest |= {"relative_angle": 1.0, "since_reversal": ranges["angle"]}
     largest |= {f"recent_square_of_{name}": ranges[name] ** 2 for name in ("angle", "rate")}
+    largest["recent_work"] = ranges["angle"] * ranges["rate"]
     if ranges.get("run_of_folder", 0.0) >= FEWEST_BEFORE:
         largest["run"] = ranges["run_of_folder"]
     return largest | {name: ranges["angle"] for name in ("recent_angle", "recent_largest_angle")}
