@@ -5,6 +5,7 @@ the other, the run or the overhang, there is a shape g as of terms over one vari
 
     (x, z) + g (−z, x),  z + x g,  z (1 + g)    what the camera sees
     κ0 = s g,  w (1 + s g),  M = B κ e^(−s g)   what acts on the strip, or with e^(−s/r) for s
+    M = B κ e^(−g |κ|/(|κ| + κ₁))               a law that changes from run to run
 
 What acts on the strip is for where no term over one variable will do. What the camera does is
 looked at with these: a zero of each run, which has as many numbers as there are runs, may otherwise
@@ -22,7 +23,7 @@ from ufl import exp
 from ....inputs.parameters import Parameter
 from ...inference.effects import Effect, Shape, Values
 from ..records import FEWEST_BEFORE
-from .shapes import SPLINES, Drawn, Of, by_turns, over_runs, splines
+from .shapes import HALF_WAY, SPLINES, Drawn, Of, by_turns, over_runs, splines
 from .term import X, Y, of_strip, on_the_strip, strip_effect, strip_form, times, turned
 from .variant import StripVariant
 
@@ -30,6 +31,9 @@ __all__ = ["products"]
 
 #: Where r is looked for, as shares of the longest strip.
 REACHES = (0.1, 0.3)
+Share = Callable[[Values, Values], Any]
+"""How much of a term there is in a place of a strip."""
+
 CALLED = {"run": "run", "length": "overhang"}
 """Variables in words."""
 
@@ -67,20 +71,42 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
                 # At the end of the longest strip, or at the clamp.
                 Shape(X["run"], Y[acts_on], last, partial(times, unit, g)),
                 acts_on,
-                partial(_placed, unit, g, last, where),
+                partial(_shared, unit, g, last, where),
             )
             for words, more, where in _places(name, ranges["length"])
             for label, parameters, g in over_runs(name, last)
         ]
         about = f"{what} that changes along the strip and from run to run"
         yield strip_effect(name, about, acts_on, ("arc_length", "run"), forms, of_two=True)
+    name, bend = "bending_moment_of_curvature_and_run", ranges["curvature"]
+    starts = tuple(bend * share for share in HALF_WAY)
+    half = Parameter(f"{name}_half_1_mm", starts, 0.01 * bend, 10.0 * bend)
+    forms = [
+        strip_form(
+            label,
+            (*parameters, half),
+            # Of what is bent the most.
+            Shape(X["run"], Y["bending_moment"], last, g),
+            "bending_moment",
+            partial(_shared, 1.0, g, last, partial(_bent, half.name)),
+        )
+        for label, parameters, g in over_runs(name, last)
+    ]
+    about = "a law of the curvature that changes from run to run"
+    yield strip_effect(name, about, "bending_moment", ("curvature", "run"), forms, of_two=True)
 
 
-def _places(name: str, longest: float) -> Iterator[tuple[str, tuple[Parameter, ...], Of]]:
+def _places(name: str, longest: float) -> Iterator[tuple[str, tuple[Parameter, ...], Share]]:
     """How much of it there is at an arc length: in words, its own numbers, and the share."""
-    yield "", (), lambda p, s: s / longest
+    yield "", (), lambda p, at: at["s"] / longest
     reach = Parameter(f"{name}_reach_mm", tuple(share * longest for share in REACHES), 1.0, longest)
-    yield ", at the clamp", (reach,), lambda p, s: exp(-s / p[reach.name])
+    yield ", at the clamp", (reach,), lambda p, at: exp(-at["s"] / p[reach.name])
+
+
+def _bent(half: str, p: Values, at: Values) -> Any:
+    """The share of a law's change at large curvatures that is there at this one."""
+    size = abs(at["kappa"])
+    return size / (size + p[half])
 
 
 def _turned_by(
@@ -120,5 +146,5 @@ def _scaled(g: Of, by: str, most: float, p: Values, at: Values) -> tuple[Any, An
     return 0.0, of_strip(1.0, g, by, most, p, at) * at["z"]
 
 
-def _placed(unit: float, g: Of, last: float, where: Of, p: Values, at: Values) -> Any:
-    return where(p, at["s"]) * of_strip(unit, g, "run", last, p, at)
+def _shared(unit: float, g: Of, last: float, share: Share, p: Values, at: Values) -> Any:
+    return share(p, at) * of_strip(unit, g, "run", last, p, at)

@@ -30,6 +30,7 @@ from ...inference.effects import Effect, Shape, Values, of_run
 from ..records import FEWEST_BEFORE
 from .products import products
 from .shapes import (
+    HALF_WAY,
     HEAVIEST,
     LARGEST,
     SHARPEST,
@@ -61,8 +62,6 @@ __all__ = ["strip_term", "terms"]
 #: Where flexibility is as without a term: about the middle of where strips bend, so that B is
 #: the stiffness there.
 MIDDLE = 0.2
-#: Curvatures by which a moment is half way to what it is at large ones, as shares of the largest.
-HALF_WAY = (0.1, 0.6)
 #: Places are seen within this many times the largest reading.
 BEYOND = 1.1
 #: Range of the strips' bending stiffness.
