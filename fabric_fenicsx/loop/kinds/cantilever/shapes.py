@@ -93,9 +93,13 @@ def over_overhangs(name: str, count: float, *, constant: bool = False) -> Iterat
     """Shapes over the few overhangs that there are, so many of them."""
     yield from splines(name, SPLINES[: 1 + (count >= FEWEST_TO_BEND)], constant=constant)
     if count >= FEWEST_TO_CHANGE:
-        label, own, step = next(places(name))
         zero = (coefficient(f"{name}_0"),) if constant else ()
-        yield label, (*zero, *own), lambda p, x: sum(p[c.name] for c in zero) + step(p, x)
+
+        def from_zero(place: Of) -> Of:
+            return lambda p, x: sum(p[c.name] for c in zero) + place(p, x)
+
+        for label, own, place in places(name):
+            yield label, (*zero, *own), from_zero(place)
 
 
 def places(name: str, sharpest: float = 0.01) -> Iterator[Drawn]:

@@ -302,7 +302,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     name, count = "reading_of_length", ranges.get("overhangs", 0.0)
     forms = [form(*shape, "length", "scale") for shape in splines(name, SPLINES)]
     several = [*over_overhangs(name, count)]
-    forms += [form(*shape, "length", "scale") for shape in several if shape[0] == "step"]
+    forms += [form(*shape, "length", "scale") for shape in several if shape[0] in ("step", "bump")]
     forms += [form(*shape, "length", "picture") for shape in several]
     # Nobody knows where a camera that moves with the overhang has its zero.
     by_overhang = over_overhangs(name, count, constant=True)
