@@ -110,9 +110,9 @@ class Crossings:
             )
             for name, value in piece.history(at).items():
                 remembered.append((f"{label}: {name}", past(name), value))
-        held: Any = 1.0
+        self._held: Function | None = None
         if slipping is not None:
-            held = slipping.held
+            self._held = slipping.held
             self.terms = [slipping.let_go(term) for term in self.terms]
             drag = slipping.adrift(gamma_n)
             self.terms.append(
@@ -120,8 +120,8 @@ class Crossings:
             )
         self._remember(histories, remembered)
         self._angle = self._compiled(gamma)
-        self._moment = self._compiled(held * sum(moments))
-        self._held = None if slipping is None else self._compiled(held)
+        whole = sum(moments)
+        self._moment = self._compiled(whole if self._held is None else self._held * whole)
 
     def _springs(
         self,
@@ -167,7 +167,7 @@ class Crossings:
         self._remember(histories, [])
         self._angle = self._compiled(None)
         self._moment = self._compiled(None)
-        self._held = None if limit is None else self._compiled(None)
+        self._held = None
 
     def _remember(self, histories: Histories, own: list[tuple[str, Any, Any]]) -> None:
         """Hand over the memories; a rank without crossings learns their names from the others."""
@@ -210,10 +210,9 @@ class Crossings:
 
         0 where none slips; as it was when the last step began.
         """
-        if self._held is None:
-            return 0.0
-        own = self._evaluated(self._held)
-        return float(self.disc.comm.allreduce(float(np.sum(1.0 - own))))
+        held = self._held
+        own = 0.0 if held is None else float(np.sum(1.0 - self.disc.crossing_values(held)))
+        return float(self.disc.comm.allreduce(own))
 
     def _evaluated(self, form: Any) -> Array:
         if form is None:

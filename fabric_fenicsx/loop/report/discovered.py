@@ -141,6 +141,11 @@ def _formulas(v: str, unit: str, reach: float) -> Iterator[_Formula]:
         lambda a, b: f"{a / reach:.3g} max({v} − {at(b)}, 0)",
     )
     yield _Formula(
+        lambda x, a, w: a * np.tanh(x / w),
+        ((1.0, 0.03), (1.0, 0.2)),
+        lambda a, w: f"{a:.3g} tanh({v}/{at(w)})",
+    )
+    yield _Formula(
         lambda x, a, b, w: a / (1.0 + np.exp(-(x - b) / w)) - a / (1.0 + np.exp(b / w)),
         ((1.0, 0.3, 0.05), (1.0, 0.6, 0.05)),
         lambda a, b, w: f"{a:.3g} s(({v} − {at(b)})/{at(w)}), s(y) = 1/(1 + exp(−y))",
@@ -154,11 +159,6 @@ def _formulas(v: str, unit: str, reach: float) -> Iterator[_Formula]:
         lambda x, a, b, w: np.where(x > b, a * np.exp(-(x - b) / w), 0.0),
         tuple((1.0, b, 0.1) for b in (0.1, 0.3, 0.5, 0.7, 0.9)),
         lambda a, b, w: f"{a:.3g} exp(−({v} − {at(b)})/{at(w)}) from {at(b)} on",
-    )
-    yield _Formula(
-        lambda x, a, w: a * np.tanh(x / w),
-        ((1.0, 0.03), (1.0, 0.2)),
-        lambda a, w: f"{a:.3g} tanh({v}/{at(w)})",
     )
     yield _Formula(
         lambda x, a, b, n: _of_sides(x, a, b) * np.abs(x) ** n,

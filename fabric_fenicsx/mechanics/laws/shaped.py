@@ -196,7 +196,7 @@ def shape_of(
         start = 1 / (1 + exp(place / width))
         return c[0] * (1 / (1 + exp(-(x - place) / width)) - start)
     if kind == "saturation":
-        return c[0] * (1 - exp(-x / width))
+        return c[0] * _saturation(x, width)
     if kind == "hyperbola":
         return c[0] * x / (size_of(x) + width)
     if kind == "logarithm":
@@ -217,11 +217,8 @@ def shape_of(
     if kind == "sides":
         return c[0] * x + c[1] * size_of(x)
     if kind in ("saturating sides", "power sides"):
-        sides = (max_value(x, 0), max_value(-x, 0))
-        if kind == "power sides":
-            return sum(c_k * _power(side, width) for c_k, side in zip(c, sides, strict=True))
-        each_side = zip(c, sides, strict=True)
-        return sum(shape_of("saturation", (c_k,), side, width=width) for c_k, side in each_side)
+        of = _power if kind == "power sides" else _saturation
+        return c[0] * of(max_value(x, 0), width) + c[1] * of(max_value(-x, 0), width)
     pieces = max(len(c) - 1, 1)
     low, high = ends
     even = [low + (high - low) * k / pieces for k in range(1, pieces)]
@@ -229,6 +226,10 @@ def shape_of(
     for c_k, knot in zip(c[2:], GRADED if kind == "graded" else even, strict=True):
         value = value + c_k * max_value(knot - x if knot < 0.0 else x - knot, 0) ** 2
     return value
+
+
+def _saturation(x: Any, width: Any) -> Any:
+    return 1 - exp(-x / width)
 
 
 def _power(x: Any, exponent: Any) -> Any:

@@ -23,8 +23,19 @@ from ufl import exp
 from ....inputs.parameters import Parameter
 from ...inference.effects import Effect, Shape, Values
 from ..records import FEWEST_BEFORE
-from .shapes import HALF_WAY, SPLINES, Drawn, Of, by_turns, over_runs, splines
-from .term import X, Y, of_strip, on_the_strip, strip_effect, strip_form, times, turned
+from .shapes import SPLINES, Drawn, Of, by_turns, over_runs, splines
+from .term import (
+    X,
+    Y,
+    bent,
+    half_way,
+    of_strip,
+    on_the_strip,
+    strip_effect,
+    strip_form,
+    times,
+    turned,
+)
 from .variant import StripVariant
 
 __all__ = ["products"]
@@ -79,8 +90,7 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
         about = f"{what} that changes along the strip and from run to run"
         yield strip_effect(name, about, acts_on, ("arc_length", "run"), forms, of_two=True)
     name, bend = "bending_moment_of_curvature_and_run", ranges["curvature"]
-    starts = tuple(bend * share for share in HALF_WAY)
-    half = Parameter(f"{name}_half_1_mm", starts, 0.01 * bend, 10.0 * bend)
+    half = half_way(name, bend)
     forms = [
         strip_form(
             label,
@@ -88,7 +98,7 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
             # Of what is bent the most.
             Shape(X["run"], Y["bending_moment"], last, g),
             "bending_moment",
-            partial(_shared, 1.0, g, last, partial(_bent, half.name)),
+            partial(_shared, 1.0, g, last, partial(bent, half.name)),
         )
         for label, parameters, g in over_runs(name, last)
     ]
@@ -101,12 +111,6 @@ def _places(name: str, longest: float) -> Iterator[tuple[str, tuple[Parameter, .
     yield "", (), lambda p, at: at["s"] / longest
     reach = Parameter(f"{name}_reach_mm", tuple(share * longest for share in REACHES), 1.0, longest)
     yield ", at the clamp", (reach,), lambda p, at: exp(-at["s"] / p[reach.name])
-
-
-def _bent(half: str, p: Values, at: Values) -> Any:
-    """The share of a law's change at large curvatures that is there at this one."""
-    size = abs(at["kappa"])
-    return size / (size + p[half])
 
 
 def _turned_by(

@@ -32,8 +32,6 @@ __all__ = [
     "wave",
 ]
 
-#: Curvatures by which a moment is half way to what it is at large ones, as shares of the largest.
-HALF_WAY = (0.1, 0.6)
 #: Numbers of coefficients of a spline.
 SPLINES = (1, 2)
 #: Where a step, or a bump, may begin to be looked for, as a share of the longest strip.

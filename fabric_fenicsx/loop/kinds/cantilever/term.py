@@ -16,7 +16,9 @@ from .variant import StripVariant
 __all__ = [
     "X",
     "Y",
+    "bent",
     "form_of_strip",
+    "half_way",
     "of_strip",
     "on_the_strip",
     "softer",
@@ -40,6 +42,9 @@ Y = {
     "load": "share_of_weight",
 }
 """Variables and what is added, with units."""
+
+#: Curvatures by which a moment is half way to what it is at large ones, as shares of the largest.
+HALF_WAY = (0.1, 0.6)
 
 
 def strip_effect(
@@ -106,6 +111,18 @@ def times(unit: float, g: Of, p: Values, x: Any) -> Any:
 def of_strip(unit: float, g: Of, by: str, most: float, p: Values, at: Values) -> Any:
     """Of what is the same all along a strip, its "length" or its "run"."""
     return unit * g(p, min_value(at[by] / most, 1))
+
+
+def half_way(name: str, bend: float) -> Parameter:
+    """Curvature by which a law of it has changed half [1/mm]; ``bend`` is the largest."""
+    starts = tuple(bend * share for share in HALF_WAY)
+    return Parameter(f"{name}_half_1_mm", starts, 0.01 * bend, 10.0 * bend)
+
+
+def bent(half: str, p: Values, at: Values) -> Any:
+    """The share of a law's change at large curvatures that is there at this one."""
+    size = abs(at["kappa"])
+    return size / (size + p[half])
 
 
 def softer(log_flexibility: Any, p: Values, at: Values) -> Any:

@@ -30,7 +30,6 @@ from ...inference.effects import Effect, Shape, Values, of_run
 from ..records import FEWEST_BEFORE
 from .products import products
 from .shapes import (
-    HALF_WAY,
     HEAVIEST,
     LARGEST,
     SHARPEST,
@@ -47,7 +46,9 @@ from .shapes import (
 from .term import (
     X,
     Y,
+    bent,
     form_of_strip,
+    half_way,
     on_the_strip,
     softer,
     strip_effect,
@@ -163,8 +164,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
     yield strip_effect(name, about, "bending_moment", ("arc_length",), forms)
 
     name = "bending_moment_of_curvature"
-    starts = tuple(bend * share for share in HALF_WAY)
-    half = Parameter(f"{name}_half_1_mm", starts, 0.01 * bend, 10.0 * bend)
+    half = half_way(name, bend)
     forms = [
         StripVariant(
             label,
@@ -230,8 +230,7 @@ def _flexible(g: Of, end: str, longest: float, p: Values, at: Values) -> Any:
 
 
 def _odd(g: Of, half: str, p: Values, at: Values) -> Any:
-    size = abs(at["kappa"])
-    return softer(g(p, size / (size + p[half])), p, at)
+    return softer(g(p, bent(half, p, at)), p, at)
 
 
 def _tabulated(

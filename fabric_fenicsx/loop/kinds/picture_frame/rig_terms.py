@@ -224,7 +224,7 @@ def _forms(
     shapes_of = list(drawn)
     if between[0] < 0.0 < between[1] and variable not in LINES and not gain:
         # Those are of one side.
-        shapes_of = [drawn for drawn in shapes_of if drawn[0] not in ("saturation", "logarithm")]
+        shapes_of = [one for one in shapes_of if one[0] not in ("saturation", "logarithm")]
         shapes_of += [(label, own | _zero(name, turning)) for label, own in both_sides(name)]
     for label, own in shapes_of:
         if own["shape"] == "spline":

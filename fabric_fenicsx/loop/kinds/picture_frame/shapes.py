@@ -272,23 +272,13 @@ def both_sides(name: str) -> Iterator[tuple[str, dict[str, Any]]]:
     of = [tuple(Parameter(f"{name}_{k}", amplitude=True) for k in two) for two in SIDED]
     yield "each side its own", {"shape": "sides", "coefficients": of[0]}
     decay = Parameter(f"{name}_decay", DECAYS, 0.01, 2.0)
-    yield (
-        "each side its own, saturation",
-        {
-            "shape": "saturating sides",
-            "coefficients": of[1],
-            "width": decay,
-        },
-    )
     exponent = Parameter(f"{name}_exponent", EXPONENTS, 0.1, 4.0)
-    yield (
-        "each side its own, power",
-        {
-            "shape": "power sides",
-            "coefficients": of[1],
-            "width": exponent,
-        },
-    )
+    for label, shape, width in (
+        ("saturation", "saturating sides", decay),
+        ("power", "power sides", exponent),
+    ):
+        numbers = {"shape": shape, "coefficients": of[1], "width": width}
+        yield f"each side its own, {label}", numbers
 
 
 def over(variable: str, name: str, wealth: int, reach: float) -> Iterator[Drawn]:
