@@ -109,6 +109,19 @@ def test_a_load_cell_of_each_run_without_a_held_out_run():
         assert abs(values[f"run{number}_offset_N"] - offset) < 4.0 * std[f"run{number}_offset_N"]
 
 
+def test_a_run_not_fitted_has_a_zero_of_its_own_where_the_fitted_one_hardly_has():
+    # What drifts in one run may begin anywhere in another: its error tests the force's shape.
+    lines = ((0.0, -0.02), (0.4, -0.015), (-0.3, 0.01))
+    measurement = measured(added=lambda run, t: lines[run][0] + lines[run][1] * t)
+    for number, run in enumerate(measurement.runs):
+        object.__setattr__(run, "holdout", number > 0)
+    found = diagnose_test(PictureFrame([measurement]))
+    assert [e.name for e in found.effects] == ["load_drift"]
+    assert [v.label for v in found.final.variants] == ["drift of each run"]
+    assert found.holdout_before > 3.0 * SIGMA
+    assert found.holdout_after < 1.15 * SIGMA
+
+
 @pytest.mark.slow
 def test_no_candidate_fits_worse_than_the_baseline():
     # Fits in which far readings count less need not come near them.

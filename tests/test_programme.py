@@ -81,6 +81,18 @@ def test_one_speed_to_and_fro_is_known_from_few_readings(control, count):
         assert where == pytest.approx(float(driven.drive(FRAME, when)[0]), abs=1e-4)
 
 
+@pytest.mark.parametrize("count", [13, 15])
+def test_a_leg_may_have_its_turns_on_both_sides_of_a_reading(count):
+    # Read ever more rarely, so that the last ways to and fro have one or two readings each.
+    driven = triangle(FRAME, 0.8, 0.0, 0.03, 3, control="angle")
+    times = driven.duration * np.linspace(0.0, 1.0, count) ** 1.4
+    p, speed = found(driven, times)
+    assert p.certain.sum() >= count - 2
+    assert rates(p)[p.certain] == pytest.approx(speed[p.certain], rel=1e-6)
+    turns = p.time[p.reading < 0]
+    assert turns == pytest.approx(np.array(driven.corners), rel=1e-6)
+
+
 @pytest.mark.parametrize("count", [13, 17, 19, 23])
 def test_a_sparse_sine_is_not_taken_for_it(count):
     driven = sine(0.7, -0.7, 0.05)

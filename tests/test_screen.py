@@ -45,8 +45,8 @@ def tried():
     test = Linear(readings(observed, run=run), columns, ("a", "b"), effects=effects)
     variances = Variances(NOISE, {"a": TAU, "b": 0.0})
     base = fit(test, (), {"a": 1.0, "b": 1.0}, test.readings.fit, variances)
-    alike, _ = test.predict((), base.values)
-    signs = {e: {v: signatures(test, base, alike, v) for v in e.variants} for e in effects}
+    alike = test.predict((), base.values)
+    signs = {e: {v: signatures(test, base, *alike, v) for v in e.variants} for e in effects}
     return test, base, Screen(base, ToFirstOrder(test, base, variances, None), signs)
 
 

@@ -127,8 +127,8 @@ def forms(
 
 def every_form(experiment: Experiment, base: Fit, variants: Sequence[Variant]) -> list[Fit]:
     """A fitted baseline with each of some forms added, specimens being alike."""
-    alike, _ = experiment.predict((), base.values)
-    starts = [((v, s),) for v in variants for s in signatures(experiment, base, alike, v)]
+    alike = experiment.predict((), base.values)
+    starts = [((v, s),) for v in variants for s in signatures(experiment, base, *alike, v)]
     return fit_combinations(experiment, base, starts, base.variances)
 
 

@@ -133,7 +133,7 @@ def rows(
                 found.rivals,
                 found.holdout_before / truth.noise,
                 found.holdout_after / truth.noise,
-                _expected(found),
+                _expected(found, truth.noise),
             )
 
 
@@ -157,10 +157,12 @@ def _without(effects: Sequence[Effect], name: str, labels: tuple[str, ...]) -> l
     return [effect for effect in map(left, effects) if effect.variants]
 
 
-def _expected(found: Diagnosis) -> float:
+def _expected(found: Diagnosis, noise: float) -> float:
     readings = found.experiment.readings
     rows = readings.holdout & readings.usable & ~found.outliers
-    return float(np.hypot(1.0, found.final.prediction_std(rows))) if rows.any() else float("nan")
+    if not rows.any():
+        return float("nan")
+    return float(np.hypot(1.0, found.final.prediction_std(rows) / noise))
 
 
 def line(row: Row) -> str:

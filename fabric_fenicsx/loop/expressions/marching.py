@@ -22,7 +22,7 @@ from ...mechanics.chain_rule import differentiated
 from ...mechanics.scalars import evaluated, lowered, parted, steps_of, symbol
 from .compiled import march
 
-__all__ = ["Marched", "Varying", "spread"]
+__all__ = ["MOST_KEPT", "Marched", "Varying", "spread"]
 
 Array = npt.NDArray[np.float64]
 

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
+from scipy.stats import chi2
 
 from ...errors import SolveError
 from .criteria import CRITERIA
@@ -142,6 +143,20 @@ class Fit:
         allowed = float(np.sum((along.T @ r) ** 2 / (1.0 + 1.0 / np.maximum(size, 1e-150) ** 2)))
         determinant = whiten.log_determinant + float(np.sum(np.log1p(size**2)))
         return max(float(r @ r) - allowed, 0.0), determinant
+
+    def chance_of(self, rows: Flags, known: Sequence[str] = ()) -> float:
+        """Chance of readings as far from what is expected as these, where parameters take it.
+
+        One parameter that is off is a single number, however many readings show it: with z the
+        residual's parts along what parameters change, each over its own scatter, that of χ² = z·z.
+        As if some common parameters were known to be as found.
+        """
+        whiten = self.variances.noise.whitener(self.readings, rows)
+        r, G = whiten(self.residual[rows]), whiten(self.slopes[rows] @ self._root_given(known))
+        along, size, _ = np.linalg.svd(G, full_matrices=False)
+        seen = size > LEAST_KNOWN * size.max(initial=0.0)
+        z = (along.T @ r)[seen] / np.hypot(1.0, size[seen])
+        return float(chi2.sf(z @ z, int(seen.sum())))
 
     def prediction_std(self, rows: Flags, known: Sequence[str] = ()) -> float:
         """Standard error of the expected readings there, root mean square.

@@ -260,16 +260,19 @@ class Judge:
     def explains(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise, in what it was fitted to and in what it was not.
 
-        A term without a formula explains nothing if holdout runs are less likely with it than
-        without, by what each says of them: that specimens differ, and how little it is known there;
-        or if it expects a larger error there than what lacks the term.
+        Nothing is explained by what expects more than twice the error of holdout runs that what
+        lacks it does, or makes them decidedly less likely, by what each model says of them: that
+        specimens differ, and how little it is known there. Nor by a term without a formula that
+        expects a larger error, or makes them less likely, at all.
         """
         out = self.held_rows
-        if out.any() and not all(effect.listed for effect in model.effects):
+        if out.any() and model is not baseline:
             both = [model.fit, baseline.fit]
             mine, other = (m.predictive_likelihood(out) for m in both)
             sharp, vague = (self.expected_holdout(m, m.rms(m.used)) for m in both)
-            if mine >= other or sharp >= vague:
+            listed = all(effect.listed for effect in model.effects)
+            times, more = (CRITERIA.significant, CRITERIA.decisive) if listed else (1.0, 0.0)
+            if sharp >= times * vague or mine >= other + more:
                 return False
         return self.fits(model, baseline) and self.foretells(model)
 
@@ -280,8 +283,12 @@ class Judge:
             error = model.fit.predictive_rms(out)
             count = int(out.sum())
             # One specimen's deviation is a single number, however many readings share it.
-            expected = self._expected_of(model)
-            if self.holdout(model.fit) > CRITERIA.significant * expected:
+            known = self._known_of(model)
+            expected = self.expected_holdout(model.fit, self.misfit(model).noise, known)
+            if (
+                self.holdout(model.fit) > CRITERIA.significant * expected
+                and model.fit.chance_of(out, known) < CRITERIA.structure_p
+            ):
                 return False
         else:
             error = self.left_out(model.fit).predictive
@@ -290,11 +297,10 @@ class Judge:
         limit = max(CRITERIA.scatter, self._by_chance(model, count))
         return bool(error * noise <= limit * self.misfit(model).reading)
 
-    def _expected_of(self, model: Model) -> float:
-        """What the error of holdout runs may be: a term without a formula has to be known there."""
+    def _known_of(self, model: Model) -> list[str]:
+        """Parameters of terms without a formula, which have to be known where they foretell."""
         terms = [v for v, e in zip(model.fit.variants, model.effects, strict=True) if not e.listed]
-        known = [p.name for v in terms for p in v.parameters]
-        return self.expected_holdout(model.fit, self.misfit(model).noise, known)
+        return [p.name for v in terms for p in v.parameters]
 
     def settled(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise alone, or so little else that nothing can be made of it."""

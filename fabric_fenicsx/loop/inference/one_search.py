@@ -12,6 +12,7 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from ...errors import SolveError
 from .criteria import CRITERIA
@@ -64,6 +65,7 @@ class Search:
         self.gave_way = False
         #: What was found so far.
         self.found: Diagnosis | None = None
+        self._last_screen: tuple[tuple[Any, ...], Screen] | None = None
         self._one_by_one: tuple[list[Candidate], list[list[Model]]] | None = None
 
     # Search -------------------------------------------------------------------------------
@@ -251,15 +253,20 @@ class Search:
     def _signed(self, effects: Sequence[Effect]) -> Signatures:
         """The baseline's sensitivities to each form of some effects."""
         base = self.models.base
-        alike, _ = self.experiment.predict((), base.values)
+        alike = self.experiment.predict((), base.values)
         return {
-            effect: {v: signatures(self.experiment, base, alike, v) for v in effect.variants}
+            effect: {v: signatures(self.experiment, base, *alike, v) for v in effect.variants}
             for effect in effects
         }
 
     def _screened(self) -> Screen:
         """All effects to first order about the baseline, with the variances as they are now."""
-        return self._screen(self._signatures)
+        now = (self.models.base, self.models.variances, self._signatures)
+        if self._last_screen is None or any(
+            a is not b for a, b in zip(self._last_screen[0], now, strict=True)
+        ):
+            self._last_screen = now, self._screen(self._signatures)
+        return self._last_screen[1]
 
     def _screen(self, signs: Signatures) -> Screen:
         base, variances = self.models.base, self.models.variances
@@ -279,13 +286,13 @@ class Search:
     def _beside(self, model: Fit, effects: Sequence[Effect]) -> list[Combination]:
         """Every form of some effects, about a model."""
         known = set(model.values)
-        alike, _ = self.experiment.predict(model.variants, model.values)
+        alike = self.experiment.predict(model.variants, model.values)
         return [
             ((variant, shape),)
             for effect in effects
             for variant in effect.variants
             if known.isdisjoint(p.name for p in variant.parameters)
-            for shape in signatures(self.experiment, model, alike, variant)
+            for shape in signatures(self.experiment, model, *alike, variant)
         ]
 
     def _together(self, count: int, fewer: Fit) -> list[Model]:

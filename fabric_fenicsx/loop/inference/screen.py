@@ -38,6 +38,8 @@ BEST_PAIRS, FORMS = 12, 3
 #: Shapes of an effect that pairs are made of, those that take most off by themselves, and pairs of
 #: effects of which all of these are: the best of those with one shape of each form.
 MOST_SHAPES, MOST_PAIRS = 60, 60
+#: Columns of which all products are taken at once, and otherwise sets that share their products.
+MOST_COLUMNS, SETS = 4000, 300
 #: Times that amplitudes of the wrong sign are taken out.
 SIGNS = 3
 
@@ -98,8 +100,8 @@ class Screen:
         norm = np.linalg.norm(C_left, axis=0)
         # What the baseline imitates to round-off has no signature of its own.
         seen = norm > LEFT * np.maximum(np.linalg.norm(C, axis=0), 1e-300)
-        C_left = np.where(seen, C_left / np.where(seen, norm, 1.0), 0.0)
-        self._gram, self._by, self._sum = C_left.T @ C_left, C_left.T @ r, float(r @ r)
+        self._left = np.where(seen, C_left / np.where(seen, norm, 1.0), 0.0)
+        self._by, self._sum = self._left.T @ r, float(r @ r)
         self._positive = np.array(positive)
         self._seen = seen
 
@@ -246,14 +248,25 @@ class Screen:
         for k, one in enumerate(sets):
             own = [place for g in one for place in g.places]
             places[k, : len(own)] = own
-        return np.concatenate(
-            [self._solved(part) for part in np.array_split(places, 1 + len(places) // 20000)]
-        )
+        # The Gram matrix of all shapes would be larger than all else in memory.
+        few = len(np.unique(places)) <= MOST_COLUMNS
+        parts = [places] if few else np.array_split(places, 1 + len(places) // SETS)
+        return np.concatenate([self._solved_in(part) for part in parts])
 
-    def _solved(self, places: Places) -> Array:
+    def _solved_in(self, places: Places) -> Array:
+        """The same from places of columns, (n_sets, width), -1 for none."""
+        columns, own = np.unique(places, return_inverse=True)
+        own = np.where(places >= 0, own.reshape(places.shape), -1)
+        columns = np.maximum(columns, 0)
+        gram = self._left[:, columns].T @ self._left[:, columns]
+        split = 1 + len(places) // 20000
+        pairs = zip(np.array_split(places, split), np.array_split(own, split), strict=True)
+        return np.concatenate([self._solved(part, gram, at) for part, at in pairs])
+
+    def _solved(self, places: Places, whole: Array, own: Places) -> Array:
         kept = (places >= 0) & self._seen[places]
         by = np.where(kept, self._by[places], 0.0)
-        gram = self._gram[places[:, :, None], places[:, None, :]]
+        gram = whole[own[:, :, None], own[:, None, :]]
         unit = np.eye(places.shape[1])
         positive = self._positive[places]
         for _ in range(SIGNS):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Parameter, Variant
 from .experiment import Experiment
-from .fitting import Fit, fit, linearised, parameters_of, soft_size
+from .fitting import Fit, fit, linearised, orthogonal_to, parameters_of, soft_size
 from .variances import Variances
 
 __all__ = ["SMALL", "Combination", "Signature", "ToFirstOrder", "fit_combinations", "signatures"]
@@ -22,6 +23,9 @@ Array = npt.NDArray[np.float64]
 
 #: Amplitudes are differentiated here rather than at zero, where |·| and friction have a corner.
 SMALL = 1e-9
+#: Combinations that are judged with their bounds, of as many as are wanted, and how many are looked
+#: at before that without them at once.
+LOOKED_AT, AT_ONCE = 6, 500
 #: Shares of a step to first order that a fit may begin with.
 DAMPED = (1.0, 0.3, 0.1, 0.0)
 #: Values of a parameter that the readings jump with, as shares of the one found; then nearer ones.
@@ -63,7 +67,7 @@ def fit_combinations(
     """
     linear = ToFirstOrder(experiment, base, variances, robust)
     by_forms: dict[tuple[Variant, ...], list[_Start]] = {}
-    for combination in combinations:
+    for combination in linear.most_promising(combinations, starts, most):
         start = linear.start(combination)
         if start is not None:
             forms = (*base.variants, *(v for v, _ in combination))
@@ -166,6 +170,57 @@ class ToFirstOrder:
     def random(self) -> Array:
         """White columns of the specimens' deviations, each of variance one, (n, q)."""
         return self._random
+
+    def most_promising(
+        self, combinations: Sequence[Combination], starts: int, most: int | None
+    ) -> list[Combination]:
+        """Those that may be the best, as if nothing had bounds and no reading were far off.
+
+        Args:
+            combinations: forms with their shapes.
+            starts: how many of each combination of forms are wanted.
+            most: how many are, of all; by default any number.
+        """
+        little = [all(one.little(v) for v, one in combination) for combination in combinations]
+        judged = [c for c, is_little in zip(combinations, little, strict=True) if is_little]
+        lefts = self._unbounded(judged)
+        order = np.argsort(lefts, kind="stable")[: most and LOOKED_AT * most * starts]
+        taken: Counter[tuple[Variant, ...]] = Counter()
+        # What begins with much of an effect is not judged by a little of it.
+        chosen = [c for c, is_little in zip(combinations, little, strict=True) if not is_little]
+        for k in order:
+            forms = tuple(v for v, _ in judged[k])
+            taken[forms] += 1
+            if taken[forms] <= LOOKED_AT * starts:
+                chosen.append(judged[k])
+        return chosen
+
+    def _unbounded(self, combinations: Sequence[Combination]) -> Array:
+        """Sums of squares that combinations of a little leave, without bounds, (n,)."""
+        rows, q = self._base.used, self._random.shape[1]
+        shared = np.concatenate(
+            [self.of_fit(self._base, list(self._base.values)), self._random], axis=1
+        )
+        shared = np.concatenate([shared, np.eye(shared.shape[1])[shared.shape[1] - q :]])
+        known = np.concatenate([self.residual, np.zeros(q)])[:, None]
+        lefts = np.full(len(combinations), np.inf)
+        for first in range(0, len(combinations), AT_ONCE):
+            part = combinations[first : first + AT_ONCE]
+            own = [[one.slopes[p.name][rows] for v, one in c for p in v.amplitudes] for c in part]
+            columns = self._whiten(np.column_stack([slope for slopes in own for slope in slopes]))
+            columns = np.concatenate([columns, np.zeros((q, columns.shape[1]))])
+            size = np.linalg.norm(columns, axis=0)
+            usable = np.isfinite(size) & (size > 0.0)
+            columns = np.where(usable, columns / np.where(usable, size, 1.0), 0.0)
+            columns = orthogonal_to(shared, np.concatenate([columns, known], axis=1))
+            r = columns[:, -1]
+            ends = np.cumsum([len(slopes) for slopes in own])
+            for k, end in enumerate(ends):
+                C = columns[:, end - len(own[k]) : end]
+                by = C.T @ r
+                step = np.linalg.solve(C.T @ C + 1e-9 * np.eye(len(by)), by)
+                lefts[first + k] = r @ r - by @ step
+        return lefts
 
     def start(self, combination: Combination) -> _Start | None:
         """The step that least squares would take within bounds, and the sum of squares after it.
@@ -363,7 +418,11 @@ class Signature:
 
 
 def signatures(
-    experiment: Experiment, base: Fit, alike: Array, variant: Variant
+    experiment: Experiment,
+    base: Fit,
+    alike: Array,
+    model: dict[str, Array],
+    variant: Variant,
 ) -> list[Signature]:
     """The model's sensitivities to an effect, for each shape of it and each start of an amplitude.
 
@@ -371,13 +430,14 @@ def signatures(
         experiment: the test.
         base: the fitted baseline.
         alike: its expected readings with specimens that are alike, (n,).
+        model: its derivatives, likewise, (n,) each.
         variant: the effect's form.
 
     Returns:
         One for each of them where the model has a solution.
     """
     found = []
-    names = [*base.values, *(p.name for p in variant.amplitudes)]
+    own = [p.name for p in variant.amplitudes]
     nothing = {p.name: SMALL for p in variant.amplitudes}
     shapes = [nothing | shape for shape in variant.grid(amplitudes=False)]
     shapes += [nothing | shape for shape in variant.grid(amplitudes=True)]
@@ -387,7 +447,11 @@ def signatures(
             expected, slopes = experiment.predict((*base.variants, variant), at)
         except SolveError:
             continue
-        found.append(Signature(at, expected, alike, {name: slopes[name] for name in names}))
+        one = Signature(at, expected, alike, {name: slopes[name] for name in (*base.values, *own)})
+        if one.little(variant):
+            # But for that little it is the model itself: thousands of them share its arrays.
+            one = Signature(at, alike, alike, model | {name: slopes[name] for name in own})
+        found.append(one)
     return found
 
 

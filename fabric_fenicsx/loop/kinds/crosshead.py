@@ -10,6 +10,7 @@ The laws are those of mechanics.laws, the same classes that a whole net takes.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf
@@ -23,7 +24,7 @@ from scipy.optimize import nnls
 from ...inputs.parameters import Parameter
 from ...mechanics.laws.dashpots import LinearDashpot
 from ...mechanics.laws.springs import PolynomialSpring
-from ..expressions.marching import Marched, Varying, spread
+from ..expressions.marching import MOST_KEPT, Marched, Varying, spread
 from ..inference.effects import Effect, Variant, of_each_run, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ..inference.noise import estimated_noise
@@ -78,6 +79,9 @@ class CrossheadTest:
         runs = [(m, run) for m in measurements for run in m.runs]
         motions = [self._motion(m, run) for m, run in runs]
         self._compiled: dict[Any, Marched] = {} if like is None else like._compiled
+        #: Angles and rates of a rig that follows the crosshead, and the moments last made of them.
+        self._still: dict[str, Varying] | None = None
+        self._last_moments: OrderedDict[Any, tuple[Any, tuple[float, ...], Varying]] = OrderedDict()
         self._recorded = RecordedRig(motions, self._compiled)
         self._points = self._recorded.points
         self._set_up(runs)
@@ -377,6 +381,28 @@ class CrossheadTest:
                 moment = moment + law.moment(crossing)
                 history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
             self._compiled[key] = marched.define({"moment": moment}, history)
+        if known is not self._still:
+            return self._made_moment(variant, key, known, values)
+        # Beside each of many effects the same model again: its moments are known.
+        names = [p.name for p in (self.baseline if variant is None else variant.parameters)]
+        names += () if variant is None else variant.of_baseline
+        numbers = tuple(values[name] for name in names)
+        last = self._last_moments.pop(variant, None)
+        if last is None or last[0] is not known or last[1] != numbers:
+            last = known, numbers, self._made_moment(variant, key, known, values)
+            if len(self._last_moments) >= MOST_KEPT:
+                self._last_moments.popitem(last=False)
+        self._last_moments[variant] = last
+        return last[2]
+
+    def _made_moment(
+        self,
+        variant: FrameVariant | None,
+        key: Any,
+        known: dict[str, Varying],
+        values: Mapping[str, float],
+    ) -> Varying:
+        """The same from its compiled expressions."""
         first = {} if variant is None else self._from_earlier_runs(variant)
         moment = self._compiled[key](known, values, first)["moment"]
         if variant is None or variant.by_run is None:
@@ -415,7 +441,8 @@ class CrossheadTest:
     ) -> tuple[Varying, list[tuple[Flags, Array]]]:
         """What the load cell adds; in a run that is not fitted, what fits best to what is left.
 
-        Also the readings of such runs, flags, and the columns that were fitted to them.
+        That is a zero and a drift, whichever of them the form has: no other run tells them. Also
+        the readings of such runs, flags, and the columns that were fitted to them.
         """
         zeros = []
         assert variant.reading is not None
@@ -431,24 +458,20 @@ class CrossheadTest:
         shape = self._points["time"].value.shape
         total, found = np.zeros(shape), {}
         left = self.readings.observed - self._recorded.at_readings(force)
+        time = self._recorded.at_readings(self._points["time"].value)
         for run in np.flatnonzero(np.broadcast_to(self._on_the_load_cell, shape[1])):
             rows = self.readings.run == run
-            own = {n: np.broadcast_to(c, shape)[:, run] for n, c in columns.items()}
             if f"run{run + 1}_{next(iter(names))}" in values:
-                for n, column in own.items():
-                    name = f"run{run + 1}_{n}"
+                for n, c in columns.items():
+                    name, column = f"run{run + 1}_{n}", np.broadcast_to(c, shape)[:, run]
                     total[:, run] += values[name] * column
                     found[name] = np.zeros(shape)
                     found[name][:, run] = column
             else:
                 rows = rows & self.readings.usable
-                J = np.column_stack(
-                    [
-                        self._recorded.at_readings(np.broadcast_to(c, shape))[rows]
-                        for c in columns.values()
-                    ]
-                )
+                line = np.column_stack([np.ones_like(time), time])
+                J = line[rows]
                 zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
                 zeros.append((rows, J))
-                total[:, run] = sum(z * c for z, c in zip(zero, own.values(), strict=True))
+                total[:, run] = zero[0] + zero[1] * self._points["time"].value[:, run]
         return Varying(total, found), zeros

@@ -58,8 +58,6 @@ class PictureFrame(CrossheadTest):
         )
 
     def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
-        # Angles and rates of a frame that follows the crosshead; see _kinematics.
-        self._still: dict[str, Varying] | None = None
         self._rig = {
             "frame": Varying(np.array([[m.rig.frame_length_mm for m, _ in runs]])),
             "fabric": Varying(np.array([[m.rig.fabric_length_mm for m, _ in runs]])),

@@ -186,7 +186,8 @@ def _to_and_fro(time: Array, values: Array, resolution: float) -> Motion | None:
     """The motion of a motion to and fro at one speed; None if the record is not that of one.
 
     Intervals without a turn all show that speed, and those with one less. So two readings tell a
-    leg where others have told the speed, and what is missing in between tells when it turned.
+    leg where others have told the speed, and what is missing in between tells when it turned. A
+    leg as short as an interval may have turns on both sides of its one reading.
     """
     step = np.diff(time)
     speed = np.diff(values) / step
@@ -195,24 +196,28 @@ def _to_and_fro(time: Array, values: Array, resolution: float) -> Motion | None:
     way = np.where(leg, np.sign(speed), 0.0)
     if leg.sum() < LEGS or not (leg[:-1] & (way[:-1] == way[1:])).any():
         return None
-    turning = np.flatnonzero(~leg)
-    inner = turning[(turning > 0) & (turning < len(leg) - 1)]
-    if (way[inner - 1] * way[inner + 1] != -1.0).any():
+    first, last = int(np.argmax(leg)), len(leg) - 1 - int(np.argmax(leg[::-1]))
+    inner = first + np.flatnonzero(~leg[first:last])
+    # The way by which an interval begins, and ends: a turn in it lies between the two.
+    into, out = way.copy(), way.copy()
+    for k in inner:
+        into[k], out[k] = out[k - 1], -out[k - 1]
+    if (out[inner] != into[inner + 1]).any():
         return None
     top = float(np.median(np.abs(speed[leg])))
     # Up to the turn at one speed, from it at the other: half of what is missing comes after it.
-    rise = np.diff(values)[inner] * way[inner - 1]
+    rise = np.diff(values)[inner] * into[inner]
     corners = time[inner] + (step[inner] + rise / top) / 2.0
-    reached = values[inner] + way[inner - 1] * top * (corners - time[inner])
-    rate = np.append(way, 0.0)
-    rate = top * np.where(rate == 0.0, np.append(0.0, way), rate)
-    known = np.append(leg, False) | np.append(False, leg)
+    reached = values[inner] + into[inner] * top * (corners - time[inner])
+    rate = np.append(into, 0.0)
+    rate = top * np.where(rate == 0.0, np.append(0.0, out), rate)
+    known = np.append(into != 0.0, False) | np.append(False, out != 0.0)
     # At a reading where the way changes it turned just there.
-    known[1:-1] &= way[:-1] * way[1:] != -1.0
+    known[1:-1] &= out[:-1] * into[1:] != -1.0
     points = np.concatenate(
         [
             np.column_stack([time, values, rate, np.arange(len(time))]),
-            np.column_stack([corners, reached, top * way[inner - 1], np.full(len(inner), -1)]),
+            np.column_stack([corners, reached, top * into[inner], np.full(len(inner), -1)]),
         ]
     )
     points = points[np.argsort(points[:, 0])]
