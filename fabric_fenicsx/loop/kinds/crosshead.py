@@ -384,8 +384,8 @@ class CrossheadTest:
         if known is not self._still:
             return self._made_moment(variant, key, known, values)
         # Beside each of many effects the same model again: its moments are known.
-        names = [p.name for p in (self.baseline if variant is None else variant.parameters)]
-        names += () if variant is None else variant.of_baseline
+        own = self.baseline if variant is None else variant.parameters
+        names = [p.name for p in own] + list(() if variant is None else variant.of_baseline)
         numbers = tuple(values[name] for name in names)
         last = self._last_moments.pop(variant, None)
         if last is None or last[0] is not known or last[1] != numbers:
