@@ -385,8 +385,8 @@ class CrossheadTest:
             return self._made_moment(variant, key, known, values)
         # Beside each of many effects the same model again: its moments are known.
         own = self.baseline if variant is None else variant.parameters
-        names = [p.name for p in own] + list(() if variant is None else variant.of_baseline)
-        numbers = tuple(values[name] for name in names)
+        of_baseline = () if variant is None else variant.of_baseline
+        numbers = tuple(values[name] for name in (*(p.name for p in own), *of_baseline))
         last = self._last_moments.pop(variant, None)
         if last is None or last[0] is not known or last[1] != numbers:
             last = known, numbers, self._made_moment(variant, key, known, values)
