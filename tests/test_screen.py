@@ -12,7 +12,7 @@ from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.screen import Screen
-from fabric_fenicsx.loop.inference.starts import ToFirstOrder, signatures
+from fabric_fenicsx.loop.inference.starts import ToFirstOrder, fit_combinations, signatures
 from fabric_fenicsx.loop.inference.variances import Variances
 
 NOISE, TAU = Noise(0.1, 0.0, 0.3), 0.2
@@ -48,6 +48,28 @@ def tried():
     alike = test.predict((), base.values)
     signs = {e: {v: signatures(test, base, *alike, v) for v in e.variants} for e in effects}
     return test, base, Screen(base, ToFirstOrder(test, base, variances, None), signs)
+
+
+def test_a_form_that_is_never_absent_is_judged_by_the_whole_of_it():
+    # Its one number has no zero at which it would be gone.
+    t = np.linspace(-1.0, 1.0, 40)
+    columns = {"a": np.ones_like(t), "b": t, "square": t**2, "cube": t**3}
+    never_absent = Effect("square", "linear", "", (Variant("s", (Parameter("square", (1.0,)),)),))
+    other = effect("cube", "cube")
+    observed = 2.0 + t + 1.2 * t**2
+    test = Linear(readings(observed), columns, ("a", "b"), effects=[never_absent, other])
+    variances = Variances(NOISE)
+    base = fit(test, (), {"a": 1.0, "b": 1.0}, test.readings.fit, variances)
+    alike = test.predict((), base.values)
+    forms = [v for e in test.effects for v in e.variants]
+    own = {v: signatures(test, base, *alike, v) for v in forms}
+    (whole,) = own[forms[0]]
+    assert whole.expected - whole.base == pytest.approx(t**2, abs=1e-12)
+    combinations = [((v, shape),) for v in forms for shape in own[v]]
+    # The other form leaves far more to first order, and is not fitted.
+    (found,) = fit_combinations(test, base, combinations, variances)
+    assert found.values["square"] == pytest.approx(1.2)
+    assert found.rms(found.used) < 1e-6
 
 
 def left(test, base, names):

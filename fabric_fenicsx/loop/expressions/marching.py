@@ -9,7 +9,6 @@ stand side by side, (n_points, n_records), and are marched together.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -20,6 +19,7 @@ import numpy.typing as npt
 
 from ...mechanics.chain_rule import differentiated
 from ...mechanics.scalars import evaluated, lowered, parted, steps_of, symbol
+from ..kept import Kept
 from .compiled import march
 
 __all__ = ["MOST_KEPT", "Marched", "Varying", "spread"]
@@ -196,19 +196,7 @@ class _Differentiated:
         return {str(k): value for k, value in enumerate(self._still(at))}
 
 
-_KEPT: OrderedDict[Any, tuple[list[Any], dict[str, Any]]] = OrderedDict()
-"""Of the expressions used last: the arrays given, and what was made of them."""
-
-
-def _kept(owner: Any, given: list[Any], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """What was made for an owner of the same arrays, or what is made now."""
-    last = _KEPT.get(owner)
-    if last is None or any(a is not b for a, b in zip(last[0], given, strict=True)):
-        last = _KEPT[owner] = given, make()
-        if len(_KEPT) > MOST_KEPT:
-            _KEPT.popitem(last=False)
-    _KEPT.move_to_end(owner)
-    return last[1]
+_kept: Kept[dict[str, Any]] = Kept(MOST_KEPT)
 
 
 def spread(values: Any, shape: tuple[int, ...]) -> Array:

@@ -31,15 +31,17 @@ class Criteria:
         missed: sigmas, from the median, by which a model misses a reading that it then leaves out;
             made-up.
         most_missed: largest share of a run that may be left out so; made-up.
-        structure_p: chance below which a test says that a residual has structure; convention.
+        structure_p: chance below which a test says that a residual has structure, or that a
+            held-out error is none that parameters explain; convention.
         hopeless_p: ... below which no small size excuses that structure; made-up.
         other_form: share of what the baseline misses that another form of the same effect may
             leave; made-up.
         decisive: −2 log likelihood, penalised, by which a model of more effects must win, and by
-            which a rival may lose; convention (Kass & Raftery, J. Am. Stat. Assoc. 90, 1995: very
-            strong evidence).
+            which a rival may lose, or held-out runs be less likely; convention (Kass & Raftery,
+            J. Am. Stat. Assoc. 90, 1995: very strong evidence).
         significant: standard errors that an amplitude must be from nothing, times what is expected
-            that a held-out error may be, and times what was stated that noise may be; convention.
+            that a held-out error may be, times what the baseline expects of it that a model may,
+            and times what was stated that noise may be; convention.
         near: error over noise up to which a model explains what it was fitted to, and what it was
             not, if the residual has structure; made-up.
         enough: ... up to which a further effect is not claimed, whatever it gains; made-up.

@@ -21,6 +21,7 @@ from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Parameter, Variant
 from .experiment import Experiment, Flags, Readings
+from .noise import Whitener
 from .variances import Linearised, Variances
 
 __all__ = [
@@ -135,27 +136,41 @@ class Fit:
 
     def _predicted(self, rows: Flags) -> tuple[float, float]:
         """For the readings there r · C⁻¹ r and ln det C, C being what a prediction scatters by."""
-        if not (np.isfinite(self.residual[rows]).all() and np.isfinite(self.slopes[rows]).all()):
+        if not self._are_numbers(rows):
             return float("inf"), 0.0
         whiten = self.variances.noise.whitener(self.readings, rows)
-        r, G = whiten(self.residual[rows]), whiten(self.slopes[rows] @ self.root)
-        along, size, _ = np.linalg.svd(G, full_matrices=False)
-        allowed = float(np.sum((along.T @ r) ** 2 / (1.0 + 1.0 / np.maximum(size, 1e-150) ** 2)))
+        r = whiten(self.residual[rows])
+        parts, size = self._along_parameters(whiten, r, rows, self.root)
+        allowed = float(np.sum(parts**2 / (1.0 + 1.0 / np.maximum(size, 1e-150) ** 2)))
         determinant = whiten.log_determinant + float(np.sum(np.log1p(size**2)))
         return max(float(r @ r) - allowed, 0.0), determinant
+
+    def _are_numbers(self, rows: Flags) -> bool:
+        """Whether what is expected there, and its slopes, are."""
+        return bool(np.isfinite(self.residual[rows]).all() and np.isfinite(self.slopes[rows]).all())
+
+    def _along_parameters(
+        self, whiten: Whitener, r: Array, rows: Flags, root: Array
+    ) -> tuple[Array, Array]:
+        """Parts of white residuals along what parameters change, and one sigma of these changes."""
+        along, size, _ = np.linalg.svd(whiten(self.slopes[rows] @ root), full_matrices=False)
+        return along.T @ r, size
 
     def chance_of(self, rows: Flags, known: Sequence[str] = ()) -> float:
         """Chance of readings as far from what is expected as these, where parameters take it.
 
         One parameter that is off is a single number, however many readings show it: with z the
         residual's parts along what parameters change, each over its own scatter, that of χ² = z·z.
-        As if some common parameters were known to be as found.
+        As if some common parameters were known to be as found. None where what is expected, or its
+        slope, is not a number.
         """
+        if not self._are_numbers(rows):
+            return 0.0
         whiten = self.variances.noise.whitener(self.readings, rows)
-        r, G = whiten(self.residual[rows]), whiten(self.slopes[rows] @ self._root_given(known))
-        along, size, _ = np.linalg.svd(G, full_matrices=False)
+        r, root = whiten(self.residual[rows]), self._root_given(known)
+        parts, size = self._along_parameters(whiten, r, rows, root)
         seen = size > LEAST_KNOWN * size.max(initial=0.0)
-        z = (along.T @ r)[seen] / np.hypot(1.0, size[seen])
+        z = parts[seen] / np.hypot(1.0, size[seen])
         return float(chi2.sf(z @ z, int(seen.sum())))
 
     def prediction_std(self, rows: Flags, known: Sequence[str] = ()) -> float:

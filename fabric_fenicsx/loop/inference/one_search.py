@@ -12,9 +12,9 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 from ...errors import SolveError
+from ..kept import Kept
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis, Verdict
@@ -65,7 +65,7 @@ class Search:
         self.gave_way = False
         #: What was found so far.
         self.found: Diagnosis | None = None
-        self._last_screen: tuple[tuple[Any, ...], Screen] | None = None
+        self._kept_screen: Kept[Screen] = Kept(1)
         self._one_by_one: tuple[list[Candidate], list[list[Model]]] | None = None
 
     # Search -------------------------------------------------------------------------------
@@ -262,11 +262,7 @@ class Search:
     def _screened(self) -> Screen:
         """All effects to first order about the baseline, with the variances as they are now."""
         now = (self.models.base, self.models.variances, self._signatures)
-        if self._last_screen is None or any(
-            a is not b for a, b in zip(self._last_screen[0], now, strict=True)
-        ):
-            self._last_screen = now, self._screen(self._signatures)
-        return self._last_screen[1]
+        return self._kept_screen(self, now, lambda: self._screen(self._signatures))
 
     def _screen(self, signs: Signatures) -> Screen:
         base, variances = self.models.base, self.models.variances

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from scipy.stats import chi2
 
 from .effects import Effect, Variant
-from .fitting import Fit, orthogonal_to
+from .fitting import Fit
 from .starts import Combination, Signature, ToFirstOrder
 
 __all__ = ["Screen", "Signatures"]
@@ -71,12 +71,6 @@ class Screen:
 
     def __init__(self, base: Fit, linear: ToFirstOrder, signatures: Signatures) -> None:
         self._count = int(base.used.sum())
-        random = linear.random
-        q = random.shape[1]
-        free = [name for name in base.values if name not in base.at_bound]
-        rest = np.concatenate([linear.of_fit(base, free), random], axis=1)
-        rest = np.concatenate([rest, np.eye(rest.shape[1])[rest.shape[1] - q :]])
-        padding = np.zeros(q)
         columns: list[Array] = []
         positive: list[bool] = []
         self._groups: list[_Group] = []
@@ -87,15 +81,16 @@ class Screen:
                     if not np.isfinite(own).all():
                         continue
                     places = tuple(range(len(columns), len(columns) + own.shape[1]))
-                    columns += [np.concatenate([c, padding]) for c in own.T]
+                    columns += list(own.T)
                     positive += signs
                     names = frozenset(p.name for p in variant.parameters)
                     self._groups.append(_Group(effect, variant, one, places, names))
         if not columns:
-            columns = [np.zeros(self._count + q)]
+            columns = [np.zeros(self._count)]
             positive = [True]
         C = np.column_stack(columns)
-        left = orthogonal_to(rest, np.column_stack([C, np.concatenate([linear.residual, padding])]))
+        free = [name for name in base.values if name not in base.at_bound]
+        left = linear.beyond(free, np.column_stack([C, linear.residual]))
         C_left, r = left[:, :-1], left[:, -1]
         norm = np.linalg.norm(C_left, axis=0)
         # What the baseline imitates to round-off has no signature of its own.
@@ -249,19 +244,25 @@ class Screen:
             own = [place for g in one for place in g.places]
             places[k, : len(own)] = own
         # The Gram matrix of all shapes would be larger than all else in memory.
-        few = len(np.unique(places)) <= MOST_COLUMNS
+        few = self._columns_of(places).sum() <= MOST_COLUMNS
         parts = [places] if few else np.array_split(places, 1 + len(places) // SETS)
         return np.concatenate([self._solved_in(part) for part in parts])
 
     def _solved_in(self, places: Places) -> Array:
         """The same from places of columns, (n_sets, width), -1 for none."""
-        columns, own = np.unique(places, return_inverse=True)
-        own = np.where(places >= 0, own.reshape(places.shape), -1)
-        columns = np.maximum(columns, 0)
-        gram = self._left[:, columns].T @ self._left[:, columns]
+        used = self._columns_of(places)
+        own = (np.cumsum(used) - 1)[places]
+        columns = self._left[:, used]
+        gram = columns.T @ columns
         split = 1 + len(places) // 20000
         pairs = zip(np.array_split(places, split), np.array_split(own, split), strict=True)
         return np.concatenate([self._solved(part, gram, at) for part, at in pairs])
+
+    def _columns_of(self, places: Places) -> npt.NDArray[np.bool_]:
+        """Which columns some places are those of; of none the last, which is not looked at."""
+        used = np.zeros(self._left.shape[1], dtype=bool)
+        used[places] = True
+        return used
 
     def _solved(self, places: Places, whole: Array, own: Places) -> Array:
         kept = (places >= 0) & self._seen[places]

@@ -171,6 +171,21 @@ class ToFirstOrder:
         """White columns of the specimens' deviations, each of variance one, (n, q)."""
         return self._random
 
+    def beyond(self, names: Sequence[str], columns: Array) -> Array:
+        """What neither some parameters of the model nor specimens' deviations can make.
+
+        Args:
+            names: of the parameters.
+            columns: white, (n, k).
+
+        Returns:
+            The columns' parts, (n + q, k): what a deviation is takes a row of its own.
+        """
+        q = self._random.shape[1]
+        made = np.concatenate([self.of_fit(self._base, names), self._random], axis=1)
+        made = np.concatenate([made, np.eye(made.shape[1])[made.shape[1] - q :]])
+        return orthogonal_to(made, np.concatenate([columns, np.zeros((q, columns.shape[1]))]))
+
     def most_promising(
         self, combinations: Sequence[Combination], starts: int, most: int | None
     ) -> list[Combination]:
@@ -181,13 +196,15 @@ class ToFirstOrder:
             starts: how many of each combination of forms are wanted.
             most: how many are, of all; by default any number.
         """
-        little = [all(one.little(v) for v, one in combination) for combination in combinations]
-        judged = [c for c, is_little in zip(combinations, little, strict=True) if is_little]
+        judged: list[Combination] = []
+        chosen: list[Combination] = []
+        for combination in combinations:
+            # What begins with much of an effect, or is never absent, is not judged by a little.
+            little = all(v.amplitudes and one.little(v) for v, one in combination)
+            (judged if little else chosen).append(combination)
         lefts = self._unbounded(judged)
         order = np.argsort(lefts, kind="stable")[: most and LOOKED_AT * most * starts]
         taken: Counter[tuple[Variant, ...]] = Counter()
-        # What begins with much of an effect is not judged by a little of it.
-        chosen = [c for c, is_little in zip(combinations, little, strict=True) if not is_little]
         for k in order:
             forms = tuple(v for v, _ in judged[k])
             taken[forms] += 1
@@ -197,22 +214,16 @@ class ToFirstOrder:
 
     def _unbounded(self, combinations: Sequence[Combination]) -> Array:
         """Sums of squares that combinations of a little leave, without bounds, (n,)."""
-        rows, q = self._base.used, self._random.shape[1]
-        shared = np.concatenate(
-            [self.of_fit(self._base, list(self._base.values)), self._random], axis=1
-        )
-        shared = np.concatenate([shared, np.eye(shared.shape[1])[shared.shape[1] - q :]])
-        known = np.concatenate([self.residual, np.zeros(q)])[:, None]
+        rows, names = self._base.used, list(self._base.values)
         lefts = np.full(len(combinations), np.inf)
         for first in range(0, len(combinations), AT_ONCE):
             part = combinations[first : first + AT_ONCE]
             own = [[one.slopes[p.name][rows] for v, one in c for p in v.amplitudes] for c in part]
             columns = self._whiten(np.column_stack([slope for slopes in own for slope in slopes]))
-            columns = np.concatenate([columns, np.zeros((q, columns.shape[1]))])
             size = np.linalg.norm(columns, axis=0)
             usable = np.isfinite(size) & (size > 0.0)
             columns = np.where(usable, columns / np.where(usable, size, 1.0), 0.0)
-            columns = orthogonal_to(shared, np.concatenate([columns, known], axis=1))
+            columns = self.beyond(names, np.column_stack([columns, self.residual]))
             r = columns[:, -1]
             ends = np.cumsum([len(slopes) for slopes in own])
             for k, end in enumerate(ends):
@@ -448,7 +459,7 @@ def signatures(
         except SolveError:
             continue
         one = Signature(at, expected, alike, {name: slopes[name] for name in (*base.values, *own)})
-        if one.little(variant):
+        if own and one.little(variant):
             # But for that little it is the model itself: thousands of them share its arrays.
             one = Signature(at, alike, alike, model | {name: slopes[name] for name in own})
         found.append(one)

@@ -10,7 +10,6 @@ The laws are those of mechanics.laws, the same classes that a whole net takes.
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf
@@ -28,6 +27,7 @@ from ..expressions.marching import MOST_KEPT, Marched, Varying, spread
 from ..inference.effects import Effect, Variant, of_each_run, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ..inference.noise import estimated_noise
+from ..kept import Kept
 from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
 from .picture_frame.motion import Motion
@@ -81,7 +81,7 @@ class CrossheadTest:
         self._compiled: dict[Any, Marched] = {} if like is None else like._compiled
         #: Angles and rates of a rig that follows the crosshead, and the moments last made of them.
         self._still: dict[str, Varying] | None = None
-        self._last_moments: OrderedDict[Any, tuple[Any, tuple[float, ...], Varying]] = OrderedDict()
+        self._kept_moments: Kept[Varying] = Kept(MOST_KEPT)
         self._recorded = RecordedRig(motions, self._compiled)
         self._points = self._recorded.points
         self._set_up(runs)
@@ -387,13 +387,9 @@ class CrossheadTest:
         own = self.baseline if variant is None else variant.parameters
         of_baseline = () if variant is None else variant.of_baseline
         numbers = tuple(values[name] for name in (*(p.name for p in own), *of_baseline))
-        last = self._last_moments.pop(variant, None)
-        if last is None or last[0] is not known or last[1] != numbers:
-            last = known, numbers, self._made_moment(variant, key, known, values)
-            if len(self._last_moments) >= MOST_KEPT:
-                self._last_moments.popitem(last=False)
-        self._last_moments[variant] = last
-        return last[2]
+        return self._kept_moments(
+            variant, (known, numbers), lambda: self._made_moment(variant, key, known, values)
+        )
 
     def _made_moment(
         self,
