@@ -195,6 +195,7 @@ REPORT = {
     },
     "effects": [],
     "best": None,
+    "instead": [],
     "curve": None,
     "holdout_expected": 0.05,
     "scatter": {},
@@ -297,6 +298,10 @@ def test_reasons_stand_where_a_rival_has_a_smaller_error():
     assert headline(unexplained | {"best": held}).endswith(
         f"with {noise:g} N left in the fitted runs, but 5 N in the held-out ones."
     )
+    other = {"effects": [{"name": "rival"}], "error_fit": noise, "error_holdout": noise}
+    said = headline(unexplained | {"best": held, "instead": [other]})
+    assert "no known effect explains" not in said
+    assert "does not tell it from rival, which the held-out readings do not contradict" in said
     assert reasons(unexplained) == []
     # Both errors are the noise's: what is wrong is the structure, not the held-out readings.
     assert "structure" in headline(unexplained) and "held-out ones" not in headline(unexplained)

@@ -123,6 +123,8 @@ class Diagnosis:
         baseline: the fitted baseline.
         final: the fitted model that is reported; the baseline where nothing was added.
         best: the model that came nearest, where that is not ``final``.
+        instead: models that fitted readings do not tell from that one, which holdout runs
+            contradict, and which they do not contradict.
         effects: of ``final``, strongest first.
         rivals: by effect, others that this data cannot tell from it.
         candidates: every effect tried.
@@ -162,6 +164,7 @@ class Diagnosis:
     outliers: Flags
     criterion_before: float = float("nan")
     criterion_after: float = float("nan")
+    instead: tuple[Fit, ...] = ()
     curve: Curve | None = None
     of_the_curve: tuple[str, ...] = ()
     others: tuple[Beside, ...] = ()

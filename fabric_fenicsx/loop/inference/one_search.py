@@ -11,7 +11,7 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from ...errors import SolveError
 from ..kept import Kept
@@ -98,6 +98,7 @@ class Search:
         misfit = self.judge.misfit(judged)
         curve = self._curve(judged) if verdict == "unexplained" else None
         of_the_curve = self._of_the_curve(levels) if curve is not None else ()
+        instead = self._instead(levels, chosen) if verdict == "unexplained" else {}
         most = CRITERIA.terms if self._screened_first else len(self.effects)
         rivals = rivals_of(self.models, self._screened, final, levels, most)
         for candidate in candidates:
@@ -116,9 +117,13 @@ class Search:
             baseline=baseline.fit,
             final=final.fit,
             best=nearest.fit if verdict == "unexplained" and nearest.effects else None,
+            instead=tuple(instead.values()),
             effects=self.models.by_strength(final),
             rivals=rivals,
-            pairs=pairs_of(self.models, final, rivals, of_the_curve),
+            pairs=[
+                *pairs_of(self.models, final, rivals, of_the_curve),
+                *pairs_of(self.models, chosen, _in_place_of(chosen, instead), ()),
+            ],
             candidates=candidates,
             holdout_before=self.judge.holdout(baseline.fit),
             holdout_after=self.judge.holdout(final.fit),
@@ -401,6 +406,26 @@ class Search:
             return "unexplained"
         return "effect_found" if all(e.listed for e in chosen.effects) else "effect_discovered"
 
+    def _instead(
+        self, levels: Sequence[Sequence[Model]], chosen: Model
+    ) -> dict[frozenset[Effect], Fit]:
+        """By their effects, models as near as the chosen one that explain what it does not.
+
+        It accounts for the fitted readings, which do not tell them from it, and holdout runs, which
+        contradict it alone, choose nothing.
+        """
+        baseline, own = levels[0][0], frozenset(chosen.effects)
+        found: dict[frozenset[Effect], Fit] = {}
+        if not own or self.experiment.curves_only or not self.judge.accounts(chosen, baseline):
+            return found
+        for model in levels[len(own)]:
+            effects = frozenset(model.effects)
+            near = model.criterion < chosen.criterion + CRITERIA.decisive
+            if near and effects != own and effects not in found and self.judge.significant(model):
+                if self.judge.explains(model, baseline):
+                    found[effects] = model.fit
+        return found
+
     def _curve(self, model: Model) -> Curve | None:
         known = self.experiment.one_curve
         if known is None:
@@ -418,6 +443,16 @@ class Search:
 def _by_itself(forms: Mapping[Variant, Sequence[Signature]]) -> list[Combination]:
     """Each shape of each form of an effect."""
     return [((variant, shape),) for variant, shapes in forms.items() for shape in shapes]
+
+
+def _in_place_of(chosen: Model, others: Iterable[frozenset[Effect]]) -> dict[str, list[str]]:
+    """By effect of a model, what others have in its place, where that is all they differ in."""
+    found: dict[str, list[str]] = {}
+    for effects in others:
+        own, its = set(chosen.effects) - effects, effects - set(chosen.effects)
+        if len(own) == len(its) == 1:
+            found.setdefault(own.pop().name, []).append(next(iter(its)).name)
+    return found
 
 
 def _nearest(levels: Sequence[Sequence[Model]]) -> Model:

@@ -50,6 +50,7 @@ def test_report(
     d, noise = diagnosis, diagnosis.noise
     rows, nearest = d.baseline.used & d.experiment.readings.first, nearest_model(d)
     compared = d.experiment.readings.usable & ~d.outliers
+    held = compared & d.experiment.readings.holdout & d.experiment.readings.first
     checks = predictive_check(nearest, compared) if compared.any() else []
     content = {
         "schema": SCHEMA,
@@ -92,6 +93,7 @@ def test_report(
         "holdout_source": d.holdout_source,
         "model": _numbers(d, d.final, d.holdout_after),
         "best": None if d.best is None else _numbers(d, d.best, d.holdout_best),
+        "instead": [_numbers(d, m, m.rms(held)) for m in d.instead],
         "next_tests": next_tests_report(sorted(advice, key=lambda t: -t.separation)),
         "identifiability": {
             "correlated": [list(pair) for pair in d.final.correlated],
@@ -308,7 +310,7 @@ def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
 
 def _parameters(d: Diagnosis) -> list[Parameter]:
     """Of every model in the report, each once."""
-    models = [d.final] if d.best is None else [d.final, d.best]
+    models = [d.final, *d.instead] if d.best is None else [d.final, d.best, *d.instead]
     found = {p.name: p for model in models for p in parameters_of(d.experiment, model.variants)}
     return list(found.values())
 

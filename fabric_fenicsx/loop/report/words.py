@@ -95,6 +95,8 @@ def _verdict(report: Mapping[str, Any]) -> str:
         names = report["curve"]["effects"]
         return text + (f" It may be {one_of(names)}." if names else "")
     nor = "and no known effect explains it, nor do several of them"
+    if report["instead"]:
+        nor = "and no effect is known to explain it"
     text = f"The residual is not noise, {nor}: held-out error {before}; {scatter}."
     noise, held = CRITERIA.scatter * error["noise"], error["before"]["holdout"]
     if fitted is not None and fitted <= noise:
@@ -118,6 +120,13 @@ def _verdict(report: Mapping[str, Any]) -> str:
             # Else a reader would wonder what it lacks.
             text += f", but {_value(report, after)} in the held-out ones"
         text += "."
+        for other in report["instead"]:
+            also = _listed([effect["name"] for effect in other["effects"]])
+            text += (
+                f" What was fitted does not tell it from {also}, which the held-out readings do "
+                f"not contradict ({_value(report, other['error_holdout'])}): fit one of these runs "
+                "as well to have it decided."
+            )
     elif report["candidates"]:
         text += " None comes nearer than the baseline itself, for what it adds."
     return text
