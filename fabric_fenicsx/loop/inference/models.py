@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from .noise import Noise, estimated_noise
 from .starts import SMALL, Combination, fit_combinations
 from .variances import Variances
 
-__all__ = ["REFINED_WITHIN", "Models", "nothing_left"]
+__all__ = ["REFINED_WITHIN", "Models", "nearest_forms", "nothing_left"]
 
 #: Scatter of specimens, as a share, that first fits allow for.
 FIRST_SCATTER = 0.1
@@ -228,6 +228,46 @@ class Models:
             refined.append(model)
         return _simplest_first(sorted(refined, key=lambda m: m.criterion)) + rest
 
+    def with_other_readings(self, levels: Sequence[Sequence[Model]]) -> list[list[Model]]:
+        """Models by their number of effects, fitted to the readings that are left in now.
+
+        The best of each effect by itself and what comes near the best of each level, with those
+        forms that are about as near; ``base`` and ``forms`` are of the same readings then.
+        """
+        known, self.forms = self.forms, {}
+        self.base = self.baseline(self.base.values)
+        return [self._again_with(level, known) for level in levels]
+
+    def _again_with(
+        self, level: Sequence[Model], known: Mapping[frozenset[Effect], Sequence[Fit]]
+    ) -> list[Model]:
+        found: dict[tuple[Variant, ...], Fit] = {}
+        best = level[0].criterion
+        taken: list[Model] = []
+        for model in level:
+            first = all(set(model.effects) != set(other.effects) for other in taken)
+            if model.criterion < best + REFINED_WITHIN or (first and len(model.effects) == 1):
+                taken.append(model)
+        for model in taken:
+            own = frozenset(model.effects)
+            for old in (model.fit, *nearest_forms(known.get(own, ()))):
+                if old.variants in found:
+                    continue
+                try:
+                    new = fit(
+                        self.experiment,
+                        old.variants,
+                        old.values,
+                        self.judge.rows,
+                        model.estimate.variances,
+                        deviations=old.deviations,
+                    )
+                except SolveError:
+                    continue
+                found[old.variants] = new
+                self.forms.setdefault(own, []).append(new)
+        return self.best_refined(self.weighed(list(found.values())))
+
     def by_strength(self, model: Model) -> tuple[Effect, ...]:
         """Effects of a model, that first which changes the expected readings most."""
 
@@ -264,3 +304,9 @@ def nothing_left(model: Fit) -> bool:
     names = [{p.name for p in v.amplitudes} for v in model.variants]
     # What is never absent has no amplitude.
     return any(own and own <= gone for own in names)
+
+
+def nearest_forms(fits: Sequence[Fit]) -> list[Fit]:
+    """Those of some fits that leave about as little as the best of them."""
+    least = min((f.sum_of_squares for f in fits), default=0.0)
+    return [f for f in fits if f.sum_of_squares < least + CRITERIA.decisive]

@@ -78,9 +78,7 @@ class Search:
             nearest = _nearest(levels)
             if self.gave_way or not self.judge.leave_out(nearest.fit):
                 break
-            self.models.take_noise_from(nearest.fit)
-            self._one_by_one = None
-            candidates, levels = self._looked_through()
+            levels = self._with_other_readings(candidates, levels)
         baseline = levels[0][0]
         self.singles = levels[1] if len(levels) > 1 else ()
         chosen = self._chosen(levels)
@@ -142,6 +140,20 @@ class Search:
             notes=[*self.experiment.notes, *notes_of(self.judge, final.fit, baseline.fit)],
         )
         return self.found
+
+    def _with_other_readings(
+        self, candidates: list[Candidate], levels: Sequence[Sequence[Model]]
+    ) -> list[list[Model]]:
+        """The models fitted to the readings as they are left out now.
+
+        Single readings, whichever they are, pull little at what ranks effects (soft L1): what was
+        found is not looked for again.
+        """
+        found = self.models.with_other_readings(levels)
+        for candidate in candidates:
+            candidate.fit = _best_of(candidate.effect, found)
+        self._one_by_one = (candidates, [list(level) for level in found[:2]])
+        return found
 
     def finds_what_several_do_not(self) -> bool:
         """Whether a single term leaves noise, where effects with names leave far more together."""
@@ -220,8 +232,7 @@ class Search:
             of_two = self._over_two_variables(candidates)
             levels[1] = sorted([*levels[1], *of_two], key=lambda m: m.criterion)
         for candidate in candidates:
-            mine = [m for m in levels[1] if m.effects == (candidate.effect,)]
-            candidate.fit = mine[0].fit if mine else None
+            candidate.fit = _best_of(candidate.effect, levels)
         return candidates, levels
 
     def _settled(self, model: Model, baseline: Model) -> bool:
@@ -453,6 +464,12 @@ def _in_place_of(chosen: Model, others: Iterable[frozenset[Effect]]) -> dict[str
         if len(own) == len(its) == 1:
             found.setdefault(own.pop().name, []).append(next(iter(its)).name)
     return found
+
+
+def _best_of(effect: Effect, levels: Sequence[Sequence[Model]]) -> Fit | None:
+    """The best model of one effect; None where it has none."""
+    singles = levels[1] if len(levels) > 1 else ()
+    return next((m.fit for m in singles if m.effects == (effect,)), None)
 
 
 def _nearest(levels: Sequence[Sequence[Model]]) -> Model:

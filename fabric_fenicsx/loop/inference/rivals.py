@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 from .criteria import CRITERIA
 from .diagnosis import Pair
-from .fitting import Fit
 from .judge import Model
-from .models import REFINED_WITHIN, Models
+from .models import REFINED_WITHIN, Models, nearest_forms
 from .screen import Screen
 
-__all__ = ["near", "nearest_forms", "pairs_of", "rivals_of"]
+__all__ = ["near", "pairs_of", "rivals_of"]
 
 
 def rivals_of(
@@ -99,9 +98,3 @@ def pairs_of(
         if all(forms):
             found.append((own, forms[0], other, forms[1]))
     return found[: CRITERIA.pairs]
-
-
-def nearest_forms(fits: Sequence[Fit]) -> list[Fit]:
-    """Those of some fits that leave about as little as the best of them."""
-    least = min((f.sum_of_squares for f in fits), default=0.0)
-    return [f for f in fits if f.sum_of_squares < least + CRITERIA.decisive]

@@ -19,8 +19,9 @@ from .effects import Effect
 from .experiment import Experiment
 from .fitting import groups_of
 from .judge import Model
+from .models import nearest_forms
 from .one_search import Search
-from .rivals import near, nearest_forms
+from .rivals import near
 
 __all__ = ["diagnose_test"]
 
