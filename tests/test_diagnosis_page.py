@@ -245,7 +245,11 @@ def test_the_headline_claims_no_more_than_readings_know_of_a_term():
     term |= {"rivals": [{"name": "crossover_friction"}, *rivals], "one_curve": False}
     found = REPORT | {"verdict": "effect_discovered", "discovered": [term]}
     said = headline(found)
-    assert "depends on the rate and direction (discovered_1) does" in said
+    assert "depends on the rate and direction (discovered_1) does: held-out" in said
+    error = REPORT["error"] | {"after": {"fit": 0.068, "holdout": 0.07}}
+    rough = headline(found | {"error": error})
+    assert "(discovered_1) does roughly: held-out" in rough
+    assert "The 0.068 N that are left in the fitted runs are more than that" in rough
     assert said.count("by path") == 1 and "crossover_friction, the moment by path or" in said
     said = headline(found | {"discovered": [term | {"one_curve": True}]})
     assert "depends on the" not in said and "acts on the moment (discovered_1) does" in said

@@ -649,6 +649,33 @@ def test_a_factor_of_two_variables():
     assert marched(law, PATH)[0] == pytest.approx(expected)
 
 
+@pytest.mark.parametrize(
+    ("also", "history"),
+    [
+        ("path", np.cumsum(np.abs(np.diff(PATH, prepend=0.0)))),
+        ("largest_angle", np.maximum.accumulate(np.abs(PATH))),
+        ("time", STEP * np.arange(1, len(PATH) + 1)),
+    ],
+)
+def test_what_is_at_one_angle_comes_with_a_history(also, history):
+    """(w + 0.5 w²) times a bump over the angle, w being a share of what is remembered."""
+    reach, w = 0.8 * history[-1], np.minimum(history / (0.8 * history[-1]), 1.0)
+    numbers = {"shape": "bump", "place": 0.4, "width": 0.2, "reach": 0.7}
+    law = ShapedLaw(
+        "odd",
+        "angle",
+        coefficients=(1.0, 0.3, 0.5, 0.15),
+        also=also,
+        also_reach=reach,
+        powers=(1, 2),
+        **numbers,
+    )
+    y, zero = (np.minimum(np.abs(PATH) / 0.7, 1.0) - 0.4) / 0.2, -2.0
+    bump = (1.0 + 0.3 * y) * np.exp(-(y**2)) - (1.0 + 0.3 * zero) * np.exp(-(zero**2))
+    expected = np.sign(PATH) * (w + 0.5 * w**2) * bump
+    assert marched(law, PATH)[0] == pytest.approx(expected)
+
+
 def test_two_terms_of_the_travel_add(tmp_path):
     """Each is seen beside the other: the force changes with either as it does with it alone."""
     experiment = PictureFrame([read_measurement(write(tmp_path / "set", 0.0))])

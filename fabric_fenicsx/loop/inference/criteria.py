@@ -44,6 +44,8 @@ class Criteria:
             and times what was stated that noise may be; convention.
         near: error over noise up to which a model explains what it was fitted to, and what it was
             not, if the residual has structure; made-up.
+        roughly: ... up to which terms without a formula, whose shapes are not the law itself,
+            explain what nothing else does; ``rough_form`` as other_form; made-up.
         enough: ... up to which a further effect is not claimed, whatever it gains; made-up.
         settled: ... up to which no further effect is looked for; made-up.
         scatter: ... and if it has none: nobody knows their noise better; made-up.
@@ -67,6 +69,8 @@ class Criteria:
         products: terms over two variables that are fitted in all forms, and further ones over a
             single one, where more is looked for; convention.
         glimpsed: of which one form is fitted to find those; convention.
+        exchanges: times that effects of the best pair are replaced in turn, if that changes it;
+            convention.
         most_terms: in one model, terms without a formula among them; convention.
         as_little, without_formula: error over that of a term without a formula up to which
             another term is its rival if it loses by so many times ``decisive``; convention.
@@ -97,6 +101,8 @@ class Criteria:
     decisive: float = 10.0
     significant: float = 2.0
     near: float = 1.15
+    roughly: float = 1.4
+    rough_form: float = 0.2
     enough: float = 1.08
     settled: float = 1.03
     scatter: float = 1.25
@@ -116,6 +122,7 @@ class Criteria:
     terms: int = 8
     products: int = 3
     glimpsed: int = 16
+    exchanges: int = 3
     most_terms: int = 2
     as_little: float = 1.02
     without_formula: float = 3.0

@@ -22,7 +22,7 @@ from scipy.stats import chi2, norm
 from .criteria import CRITERIA
 from .effects import Effect, Variant
 from .experiment import Experiment
-from .fitting import Fit, linearised
+from .fitting import Fit, groups_of, linearised
 from .noise import Noise, Whiteness, missed_readings, outliers, whiteness
 from .validation import CrossValidation, cross_validated, fitted_without, parts_by, stretches
 from .variances import (
@@ -235,12 +235,17 @@ class Judge:
             model.estimate.variances.noise.correlation > CRITERIA.slow_noise
         )
 
-    def fits(self, model: Model, baseline: Model) -> bool:
+    def fits(self, model: Model, baseline: Model, *, roughly: bool = False) -> bool:
         """Whether a model leaves noise, in size, on what it was fitted to.
 
         Noise of far more than was stated for it is none.
         Structure may be left that is small beside noise; where it is beyond doubt, only what is
         also small beside what the baseline missed: another form of the same effect.
+
+        Args:
+            model: to be judged.
+            baseline: the model without effects.
+            roughly: whether more may be left, as by shapes that are near a law and not the law.
         """
         found = self.misfit(model)
         if self.given and found.reading > CRITERIA.significant * self.given:
@@ -252,31 +257,45 @@ class Judge:
             missed, before = (
                 max(rms**2 - found.noise**2, 0.0) for rms in (left, baseline.fit.rms(used))
             )
-            if missed >= CRITERIA.other_form**2 * before:
+            share = CRITERIA.rough_form if roughly else CRITERIA.other_form
+            if missed >= share**2 * before:
                 return False
         allowed = CRITERIA.near if found.whiteness.structured else CRITERIA.scatter
+        allowed = CRITERIA.roughly if roughly else allowed
         return left <= found.noise * max(allowed, self._by_chance(model, freedom))
 
-    def explains(self, model: Model, baseline: Model) -> bool:
+    def explains(self, model: Model, baseline: Model, *, roughly: bool = False) -> bool:
         """Whether a model leaves noise, in what it was fitted to and in what it was not.
 
         Nothing is explained by what expects more than twice the error of holdout runs that what
         lacks it does, or makes them decidedly less likely, by what each model says of them: that
-        specimens differ, and how little it is known there. Nor by a term without a formula that
-        expects a larger error, or makes them less likely, at all.
+        specimens differ, and how little it is known there. Nor by a term without a formula, or an
+        effect that is another one in each specimen, that expects a larger error, or makes them less
+        likely, at all.
         """
         out = self.held_rows
         if out.any() and model is not baseline:
             both = [model.fit, baseline.fit]
             mine, other = (m.predictive_likelihood(out) for m in both)
             sharp, vague = (self.expected_holdout(m, m.rms(m.used)) for m in both)
-            listed = all(effect.listed for effect in model.effects)
-            times, more = (CRITERIA.significant, CRITERIA.decisive) if listed else (1.0, 0.0)
+            known = all(effect.listed for effect in model.effects) and not self.uneven(model.fit)
+            times, more = (CRITERIA.significant, CRITERIA.decisive) if known else (1.0, 0.0)
             if sharp >= times * vague or mine >= other + more:
                 return False
-        return self.fits(model, baseline) and self.foretells(model)
+        fits = self.fits(model, baseline, roughly=roughly)
+        return fits and self.foretells(model, roughly=roughly)
 
-    def foretells(self, model: Model) -> bool:
+    def uneven(self, model: Fit) -> bool:
+        """Whether an effect of a model is unusually different in each specimen.
+
+        It may go by something that specimens differ in.
+        """
+        usual = CRITERIA.significant * CRITERIA.usual_scatter
+        groups = groups_of(self.experiment, model.variants)
+        own = set(groups) - {p.name for p in self.experiment.baseline}
+        return any(model.variances.scatter.get(group, 0.0) > usual for group in own)
+
+    def foretells(self, model: Model, *, roughly: bool = False) -> bool:
         """Whether a model predicts what was left out, as well as its parameters are known."""
         out = self.held_rows
         if out.any():
@@ -294,7 +313,8 @@ class Judge:
             error = self.left_out(model.fit).predictive
             count = int(model.fit.used.sum())
         noise = model.fit.variances.noise.typical(self._readings, model.fit.used)
-        limit = max(CRITERIA.scatter, self._by_chance(model, count))
+        allowed = CRITERIA.roughly if roughly else CRITERIA.scatter
+        limit = max(allowed, self._by_chance(model, count))
         return bool(error * noise <= limit * self.misfit(model).reading)
 
     def _known_of(self, model: Model) -> list[str]:

@@ -65,6 +65,8 @@ class Search:
         self.gave_way = False
         #: What was found so far.
         self.found: Diagnosis | None = None
+        #: Effects that every other one was tried beside.
+        self._tried: set[frozenset[Effect]] = set()
         self._kept_screen: Kept[Screen] = Kept(1)
         self._one_by_one: tuple[list[Candidate], list[list[Model]]] | None = None
 
@@ -98,7 +100,7 @@ class Search:
         of_the_curve = self._of_the_curve(levels) if curve is not None else ()
         instead = self._instead(levels, chosen) if verdict == "unexplained" else {}
         most = CRITERIA.terms if self._screened_first else len(self.effects)
-        rivals = rivals_of(self.models, self._screened, final, levels, most)
+        rivals = rivals_of(self.models, self._screened, final, levels, most, self._tried)
         for candidate in candidates:
             if candidate.fit is not None:
                 # Those far behind have not got their own noise and scatter yet.
@@ -161,7 +163,7 @@ class Search:
             self.run()
         found = self.found
         assert found is not None
-        if found.verdict != "effect_discovered" or len(found.effects) != 1:
+        if found.verdict != "effect_discovered" or len(found.effects) != 1 or not self.accounted:
             return False
         base, variances = self.models.base, found.final.variances
         linear = ToFirstOrder(self.experiment, base, variances, None)
@@ -194,7 +196,7 @@ class Search:
             levels.append(self._together(count, fewer))
             self._with_one_less(levels)
             if self._screened_first and levels[-1]:
-                self._with_another(levels, fewer)
+                self._exchanged(levels, fewer)
                 self._in_other_forms(levels)
             # With an effect of which nothing is left it is a model of fewer, which is among those.
             levels[-1] = [m for m in levels[-1] if not nothing_left(m.fit)]
@@ -339,25 +341,33 @@ class Search:
         new = [f for f in found if f.variants not in tried]
         levels[-2] = self.models.best_refined([*levels[-2], *self.models.weighed(new)])
 
-    def _with_another(self, levels: list[list[Model]], tried: Fit) -> None:
-        """The best model of the last level with each of its effects replaced by any other.
+    def _exchanged(self, levels: list[list[Model]], first: Fit) -> None:
+        """The best model of the last level with each effect in turn replaced by any other.
 
-        What was added to the best model of one effect less stands for what that one has wrong.
+        What was added to the best model of one effect less stands for what that one has wrong; and
+        what is best beside it may be best beside another.
+
+        Args:
+            levels: models by their number of effects, which more are added to.
+            first: what everything was added to already.
         """
-        best = levels[-1][0]
-        if self.judge.settled(best, levels[0][0]):
-            return
-        own = [set(best.fit.variants) - {out} for out in best.fit.variants]
-        found: list[Fit] = []
-        for model in levels[-2]:
-            kept = set(model.fit.variants)
-            if kept in own and kept != set(tried.variants):
-                own.remove(kept)
+        tried = {frozenset(first.variants)}
+        for _ in range(CRITERIA.exchanges):
+            self._with_one_less(levels)
+            whole = set(levels[-1][0].fit.variants)
+            kept = [frozenset(whole - {out}) for out in whole]
+            bases = {frozenset(m.fit.variants): m for m in reversed(levels[-2])}
+            own = [k for k in kept if k in bases and k not in tried]
+            if not own:
+                break
+            tried |= set(own)
+            found: list[Fit] = []
+            for model in (bases[k] for k in own):
                 base = self.models.with_these_variances(model)
                 more = self._added_to(base)
                 found += self.models.fitted(more, starts=1, base=base, most=CRITERIA.terms)
-        if found:
             levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
+        self._tried |= {frozenset(map(self.models.effect_of, kept)) for kept in tried}
 
     def _in_other_forms(self, levels: list[list[Model]]) -> None:
         """The best model of the last level with each of its effects in each of its forms.
@@ -413,9 +423,10 @@ class Search:
         if self.experiment.curves_only:
             # Every effect can be such curves: none is told from the others.
             return "unexplained"
-        if not self.judge.explains(chosen, baseline):
+        listed = all(e.listed for e in chosen.effects)
+        if not self.judge.explains(chosen, baseline, roughly=not listed):
             return "unexplained"
-        return "effect_found" if all(e.listed for e in chosen.effects) else "effect_discovered"
+        return "effect_found" if listed else "effect_discovered"
 
     def _instead(
         self, levels: Sequence[Sequence[Model]], chosen: Model

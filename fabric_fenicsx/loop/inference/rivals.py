@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from .criteria import CRITERIA
 from .diagnosis import Pair
+from .effects import Effect
 from .judge import Model
 from .models import REFINED_WITHIN, Models, nearest_forms
 from .screen import Screen
@@ -19,6 +20,7 @@ def rivals_of(
     final: Model,
     levels: Sequence[Sequence[Model]],
     most: int,
+    tried: Collection[frozenset[Effect]],
 ) -> dict[str, list[str]]:
     """For each effect of a model, the others that could take its place in it.
 
@@ -28,17 +30,17 @@ def rivals_of(
         final: the model.
         levels: models that are known, by their number of effects.
         most: effects that are tried beside others of the model, the most promising.
+        tried: effects that every other one was tried beside already.
     """
     found: dict[str, list[str]] = {}
     others = [e for e in models.effects if e not in final.effects]
-    screen = screened() if len(final.effects) > 1 else None
     for own in final.effects:
         kept = [e for e in final.effects if e is not own]
         level = levels[len(final.effects)]
         known = {other: [m for m in level if set(m.effects) == {other, *kept}] for other in others}
-        if screen is not None:
+        if kept and frozenset(kept) not in tried:
             forms = [v for v in final.fit.variants if models.effect_of(v) is not own]
-            combinations = screen.instead(forms, [e for e in others if not known[e]], most)
+            combinations = screened().instead(forms, [e for e in others if not known[e]], most)
             for model in models.weighed(models.fitted(combinations, starts=1)):
                 if model.criterion < final.criterion + REFINED_WITHIN:
                     (other,) = set(model.effects) - set(kept)

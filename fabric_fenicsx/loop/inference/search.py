@@ -17,7 +17,6 @@ from .criteria import CRITERIA
 from .diagnosis import Diagnosis
 from .effects import Effect
 from .experiment import Experiment
-from .fitting import groups_of
 from .judge import Model
 from .models import nearest_forms
 from .one_search import Search
@@ -61,7 +60,7 @@ def diagnose_test(
     own = [effect.name for effect in found.effects]
     alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
     in_its_way = experiment.each_its_own_way and search.specimens_differ
-    doubtful = in_its_way or _at_the_edge(found) or _uneven(found)
+    doubtful = in_its_way or _at_the_edge(found) or search.judge.uneven(found.final)
     rivals = bool(own) and (experiment.terms_are_rivals or doubtful)
     if search.effects_needed > 1:
         # Several effects with names may imitate a single one that has none.
@@ -85,6 +84,10 @@ def diagnose_test(
                 names_of += [effect.name for effect in found.effects]
         elif search.effects_needed == 1:
             _name(single, other, other.effects[0], search, found.effects[0])
+        if single.doubtful_noise:
+            several = _several(further, other.criterion_after)
+            if several is not None:
+                return _beside(several, found)
         return _beside(other, found)
     nearest = min((m.criterion for m in single.singles), default=float("inf"))
     if own and not single.accounted and nearest < final.criterion - CRITERIA.decisive:
@@ -93,13 +96,20 @@ def diagnose_test(
         return _beside(further.run(), found)
     if own and search.judge.slow_noise(final):
         # As slow as a misfit: what several terms explain instead is not said to be noise.
-        further.most = None
-        several = further.run()
-        if further.accounted and several.criterion_after < final.criterion - CRITERIA.decisive:
+        several = _several(further, final.criterion)
+        if several is not None:
             return _beside(several, found)
     if search.effects_needed == 1 and (rivals or alike):
         _name_terms(search, found, final, single, other)
     return found
+
+
+def _several(further: Search, criterion: float) -> Diagnosis | None:
+    """What several terms explain, if that is decidedly better than a criterion."""
+    further.most = None
+    found = further.run()
+    better = found.criterion_after < criterion - CRITERIA.decisive
+    return found if further.accounted and better else None
 
 
 def _at_the_edge(found: Diagnosis) -> bool:
@@ -109,18 +119,6 @@ def _at_the_edge(found: Diagnosis) -> bool:
     """
     free = {p.name for v in found.final.variants for p in v.parameters if not p.amplitude}
     return bool(free & set(found.final.at_bound))
-
-
-def _uneven(found: Diagnosis) -> bool:
-    """Whether an effect that was found is unusually different in each specimen.
-
-    It may go by something that specimens differ in.
-    """
-    usual = CRITERIA.significant * CRITERIA.usual_scatter
-    groups = groups_of(found.experiment, found.final.variants)
-    own = set(groups) - {p.name for p in found.experiment.baseline}
-    scatter = found.final.variances.scatter
-    return any(scatter.get(group, 0.0) > usual for group in own)
 
 
 def _beside(further: Diagnosis, found: Diagnosis) -> Diagnosis:

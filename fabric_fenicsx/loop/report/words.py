@@ -140,10 +140,17 @@ def _discovered(report: Mapping[str, Any], before: str, after: str, scatter: str
         found.append(f"something that acts on the {_acts_on(term)}{depends} ({term['name']})")
     names = [effect["name"] for effect in report["beside"]]
     beside = f", beside {_listed(names)}, which may be part of it" if names else ""
+    fitted, noise = report["error"]["after"]["fit"], report["error"]["noise"]
+    roughly = fitted > CRITERIA.scatter * noise
     text = (
-        f"No known effect explains the residual; {_listed(found)} does{beside}: held-out error "
-        f"{before} before, {after} after{_foreseen(report)}; {scatter}."
+        f"No known effect explains the residual; {_listed(found)} does{' roughly' * roughly}"
+        f"{beside}: held-out error {before} before, {after} after{_foreseen(report)}; {scatter}."
     )
+    if roughly:
+        text += (
+            f" The {_value(report, fitted)} that are left in the fitted runs are more than that: "
+            "the law is near such a shape and not of it, or something smaller acts as well."
+        )
     return text + "".join(_not_told(term) for term in terms if term["rivals"])
 
 

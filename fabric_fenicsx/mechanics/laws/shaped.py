@@ -30,7 +30,7 @@ Variable = Literal[
     "recent_square_of_rate",
     "recent_work",
 ]
-AtHand = Literal["angle", "rate"]
+Also = Literal["angle", "rate", "largest_angle", "path", "time"]
 Kind = Literal[
     "spline",
     "graded",
@@ -301,7 +301,7 @@ class ShapedLaw(CrossingLaw):
         exponent, flow_rate: n > 1 and r [rad/s], of one that flows.
         memory: τ of a variable that forgets [s].
         also: w, another variable that f depends on, if it does.
-        also_reach: w_max [rad or rad/s].
+        also_reach: w_max [rad, rad/s or s].
         powers: p; ``coefficients`` has those of f_p for each in turn.
         constants: a_p, in the unit of the coefficients; none are all nothing.
 
@@ -323,7 +323,7 @@ class ShapedLaw(CrossingLaw):
     exponent: Any = number("exponent", "of a flow", default=5.0)
     flow_rate: Any = number("flow_rate_rad_s", "at which a flow is at its limit", default=0.01)
     memory: Any = number("memory_s", "of a variable that forgets", default=1.0)
-    also: AtHand | None = number("also", "another variable of the factor", AtHand | None, None)
+    also: Also | None = number("also", "another variable of the factor", Also | None, None)
     also_reach: Any = number("also_reach", "its largest value that was seen", default=1.0)
     powers: Any = number("powers", "of it, each with coefficients", list[NotNegative], [])
     constants: Any = number("constants", "of the factor, for each power", list[float], [])
@@ -363,6 +363,12 @@ class ShapedLaw(CrossingLaw):
         past = None if self.variable in AT_HAND else at.past("variable")
         return VARIABLES[self.variable](at, past, at.number(self.memory))
 
+    def _also_at(self, at: Crossing) -> Any:
+        """W at the end of the step."""
+        assert self.also is not None
+        past = None if self.also in AT_HAND else at.past("also")
+        return VARIABLES[self.also](at, past, None)
+
     def _remembered(self, at: Crossing) -> Any:
         if self.variable == "relative_angle":
             return max_value(at.past("variable"), at.size)
@@ -378,7 +384,7 @@ class ShapedLaw(CrossingLaw):
         constant = at.number(self.constant)
         if self.also is None:
             return constant + shape_of(self.shape, parts, x, place, width)
-        w = min_value(VARIABLES[self.also](at, None, None) / at.number(self.also_reach), 1)
+        w = min_value(self._also_at(at) / at.number(self.also_reach), 1)
         powers = tuple(self.powers)
         return constant + product_of(self.shape, parts, x, w, powers, constants, place, width)
 
@@ -390,12 +396,14 @@ class ShapedLaw(CrossingLaw):
         return self._base_at(at) * self.factor(at)
 
     def history(self, at: Crossing) -> dict[str, Any]:
-        """The variable, if it remembers, and what the base remembers of its own.
+        """The variables, if they remember, and what the base remembers of its own.
 
         Of a friction its moment over its limit, of a state of rest the largest angle so far and
         its sign.
         """
         history = {} if self.variable in AT_HAND else {"variable": self._remembered(at)}
+        if self.also is not None and self.also not in AT_HAND:
+            history["also"] = self._also_at(at)
         if self.base == "rest":
             history |= {"largest": max_value(at.past("largest"), at.size), "side": self._side(at)}
         if self.base in FRICTION:

@@ -115,7 +115,6 @@ class Cantilever:
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType(
         {"clamp_tilt": ("reading_of_distance",)}
     )
-    alike: frozenset[str] = frozenset()
 
     def __init__(
         self,
@@ -184,6 +183,14 @@ class Cantilever:
         rows = self.readings.fit
         pairs = np.unique(np.stack([self.readings.specimen[rows], self._length[rows]]), axis=1)
         return all(len(np.unique(one)) == pairs.shape[1] for one in pairs)
+
+    @property
+    def alike(self) -> frozenset[str]:  # type: ignore[override]
+        """Zeros by the overhang and by the run, where either has one of the other."""
+        rows = self.readings.fit
+        pairs = np.unique(np.stack([self._run[rows], self._length[rows]]), axis=1)
+        one_each = all(len(np.unique(one)) == pairs.shape[1] for one in pairs)
+        return frozenset(("reading_of_run", "reading_of_length")) if one_each else frozenset()
 
     @property
     def _distance(self) -> Array:

@@ -3,6 +3,8 @@
 Of w, which is at hand at a crossing, each has a few powers, of v a shape, see product_of:
 
     base · Σ_p (w/w_max)^p (a_p + f_p(v/v_max))
+
+What is at one angle alone, or begins at one, is there with w and v the other way round.
 """
 
 from __future__ import annotations
@@ -14,7 +16,18 @@ from typing import Any
 
 from ....inputs.parameters import Parameter
 from ...inference.effects import Effect, Shape
-from .shapes import FORGETFUL, SQUARES, X, Y, fitted, of_powers, product, remembered_since, shapes
+from .shapes import (
+    FORGETFUL,
+    SQUARES,
+    X,
+    Y,
+    bumps,
+    fitted,
+    of_powers,
+    product,
+    remembered_since,
+    shapes,
+)
 from .terms import as_reported, of_a_law, remembering
 from .variant import FrameVariant
 
@@ -32,6 +45,7 @@ class _Kind:
         by: v.
         wealth: how many shapes of v, see ``shapes``.
         constants: whether there are a_p.
+        turned: p of a history w, where v is the angle; none are no such forms.
         depends_on: what a report says beside v and w.
     """
 
@@ -41,19 +55,26 @@ class _Kind:
     by: tuple[str, ...]
     wealth: int = 3
     constants: bool = False
+    turned: tuple[tuple[int, ...], ...] = ()
     depends_on: tuple[str, ...] = ()
 
 
+AT_AN_ANGLE = ("bump", "step")
+"""Shapes that powers of the angle are far from."""
+
 HISTORIES = ("largest_angle", "path", "time")
+
+GROWING = ((1,), (0, 1, 2))
+"""Powers of a history in whose course something at an angle comes, or comes and goes."""
 
 BY = (*HISTORIES, "relative_angle", "rate", "unloading", *FORGETFUL)
 
 KINDS = (
-    _Kind("odd", "angle", ((1,), (1, 3), (1, 2, 3)), BY, 4),
+    _Kind("odd", "angle", ((1,), (1, 3), (1, 2, 3)), BY, 4, turned=GROWING),
     _Kind("odd_in_rate", "angle", ((0, 1), (0, 1, 2)), ("rate",)),
     _Kind("odd_in_rate", "rate", ((1, 2),), (*HISTORIES, *FORGETFUL)),
-    _Kind("viscous", "angle", ((0, 1),), HISTORIES, 2, True, ("rate",)),
-    _Kind("dissipative", "angle", ((0, 1),), HISTORIES, 2, True, ("direction",)),
+    _Kind("viscous", "angle", ((0, 1),), HISTORIES, 2, True, GROWING, ("rate",)),
+    _Kind("dissipative", "angle", ((0, 1),), HISTORIES, 2, True, GROWING, ("direction",)),
 )
 """Of an elastic law, whatever its shape, what rises or falls with something else; of a flow by its
 rate, a dashpot and a friction that depend on the angle, likewise."""
@@ -70,6 +91,7 @@ def products(largest: Mapping[str, float]) -> list[Effect]:
         for by, variables in as_reported(kind.by).items():
             name = f"{kind.base}_moment_of_{kind.also}_and_{by}"
             forms = [form for v in variables for form in _forms(kind, name, v, largest)]
+            forms += [form for w in variables for form in _turned(kind, name, w, largest)]
             words = f"{kind.base} moment, by {kind.also} and {by} together"
             found.append(
                 Effect(
@@ -109,6 +131,22 @@ def _forms(
                 form = _form(f"{words}, {label}, powers {said}", every, carried, like)
                 first = first or form
                 yield form
+
+
+def _turned(
+    kind: _Kind, name: str, history: str, largest: Mapping[str, float]
+) -> Iterator[FrameVariant]:
+    """Forms in which a shape over the angle goes by powers of a history."""
+    for powers in kind.turned if history in HISTORIES else ():
+        fixed: dict[str, Any] = {"base": kind.base, "variable": kind.also, "also": history}
+        fixed |= {"reach": largest[kind.also], "also_reach": largest[history], "powers": powers}
+        fixed |= remembering(name, kind.base, kind.also, largest)
+        said = f"powers {', '.join(map(str, powers))} of {history.replace('_', ' ')}"
+        for label, one, numbers in (*bumps(name), *shapes(name, 2)):
+            coefficients = of_powers(name, powers, one)
+            if label in AT_AN_ANGLE and coefficients is not None:
+                own = fixed | numbers | {"coefficients": coefficients}
+                yield _form(f"{kind.also}, {label}, {said}", own, "", None)
 
 
 def _shapes(

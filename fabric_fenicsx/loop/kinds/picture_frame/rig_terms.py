@@ -33,7 +33,7 @@ from .variant import FrameVariant
 __all__ = ["RIG_VARIABLES", "RigVariable", "of_the_rig", "rig_term", "rig_terms"]
 
 #: Most cycles over the range that a periodic term is looked for with.
-CYCLES = {"time": 40.0, "displacement": 16.0}
+CYCLES = {"time": 40.0, "displacement": 16.0, "force": 8.0}
 #: ... in time with overtones: more of them follow what is read too seldom.
 SWITCHED = 8.0
 #: Share of the largest speed below which its sign is rounded.
@@ -174,6 +174,7 @@ def rig_terms(largest: Mapping[str, float], ends: Ends) -> Iterator[Effect]:
                 forms += _forms(acts_on, name, "force_size", largest, ends, gain=True)
             if name == "reading_of_speed":
                 forms += _forms(acts_on, name, "speed_size", largest, ends, "at its rate")
+                forms += _forms(acts_on, name, "speed_size", largest, ends)
             yield rig_term(acts_on, name, reported, forms)
     for acts_on, ways in WAYS.items():
         for variable in (v for v in AGAINST_THE_MOTION if v in largest):
@@ -383,7 +384,8 @@ def _added(
             # A friction that falls with the speed, or grows; what is less bent is among the others.
             if label not in ("linear", "2 coefficients", "logarithm"):
                 also = {"coefficients": coefficients} | _zero(name, turning)
-                yield f"friction, {label}", numbers | also
+                kind = "friction" if turning else "whichever way"
+                yield f"{kind}, {label}", numbers | also
         return
     if variable in LINES:
         yield "linear", {"shape": "spline", "coefficients": one}
@@ -401,7 +403,7 @@ def _added(
     few = 2 if seldom else wealth(name.partition("_")[0], variable)
     for label, coefficients, numbers in over(variable, name, few, reach):
         yield label, numbers | {"coefficients": coefficients} | constant
-    if variable in ("time", "displacement") and not turning:
+    if variable in CYCLES and not turning:
         for label, coefficients, numbers in bumps(name, between):
             yield label, numbers | {"coefficients": coefficients} | constant
         # Where a run begins a wave may be anywhere.
