@@ -162,3 +162,14 @@ def test_held_out_runs_that_contradict_one_of_two_that_fit_alike_name_the_other(
     assert other["error_holdout"] < 0.5 * report["best"]["error_holdout"]
     assert other["effects"][0]["name"] in report["headline"]
     assert {frozenset(test["effects"]) for test in report["next_tests"]} == {frozenset(effects)}
+
+
+def test_what_meets_held_out_runs_may_know_little_of_them(tmp_path):
+    """The baseline, at one rate, is sure of what it is wrong about; friction is less sure."""
+    recipe = next(r for r in sixty(73) if r.name == "crossover_friction-stick")
+    truth = recipe(tmp_path / "set")
+    found, _ = diagnosed(read_measurement(tmp_path / "set"), ["crossover_friction"])
+    assert found.verdict == "effect_found"
+    vague, sure = found.holdout_expected, found.baseline.prediction_std(found.baseline.used)
+    assert vague > 2.0 * truth.noise > sure
+    assert found.holdout_after < 1.25 * truth.noise < found.holdout_before

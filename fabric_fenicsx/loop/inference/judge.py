@@ -267,20 +267,23 @@ class Judge:
     def explains(self, model: Model, baseline: Model, *, roughly: bool = False) -> bool:
         """Whether a model leaves noise, in what it was fitted to and in what it was not.
 
-        Nothing is explained by what expects more than twice the error of holdout runs that what
-        lacks it does, or makes them decidedly less likely, by what each model says of them: that
-        specimens differ, and how little it is known there. Nor by a term without a formula, or an
-        effect that is another one in each specimen, that expects a larger error, or makes them less
-        likely, at all.
+        Nothing is explained by what makes holdout runs decidedly less likely than what lacks it, by
+        what each model says of them: that specimens differ, and how little it is known there; or by
+        what is vague there, in that it expects more than twice the error that what lacks it does,
+        and is off by more than twice the noise. Nor by a term without a formula, or an effect that
+        is another one in each specimen, that makes them less likely, or expects a larger error, at
+        all.
         """
         out = self.held_rows
         if out.any() and model is not baseline:
             both = [model.fit, baseline.fit]
             mine, other = (m.predictive_likelihood(out) for m in both)
-            sharp, vague = (self.expected_holdout(m, m.rms(m.used)) for m in both)
+            expected = [self.expected_holdout(m, m.rms(m.used)) for m in both]
             known = all(effect.listed for effect in model.effects) and not self.uneven(model.fit)
             times, more = (CRITERIA.significant, CRITERIA.decisive) if known else (1.0, 0.0)
-            if sharp >= times * vague or mine >= other + more:
+            off = self.holdout(model.fit) > CRITERIA.significant * self.misfit(model).noise
+            vague = expected[0] >= times * expected[1] and off
+            if vague or mine >= other + more:
                 return False
         fits = self.fits(model, baseline, roughly=roughly)
         return fits and self.foretells(model, roughly=roughly)
