@@ -173,3 +173,12 @@ def test_what_meets_held_out_runs_may_know_little_of_them(tmp_path):
     vague, sure = found.holdout_expected, found.baseline.prediction_std(found.baseline.used)
     assert vague > 2.0 * truth.noise > sure
     assert found.holdout_after < 1.25 * truth.noise < found.holdout_before
+
+
+def test_noise_that_sixty_readings_tell_is_not_known_to_a_quarter(tmp_path):
+    """Nothing was put in, and the fitted run happens to scatter by less than the held-out one."""
+    recipe = next(r for r in sixty(73) if r.name == "none-shear-hold")
+    truth = recipe(tmp_path / "set")
+    found, _ = diagnosed(read_measurement(tmp_path / "set"))
+    assert found.verdict == "no_effect"
+    assert found.noise < 0.8 * truth.noise and found.holdout_after > 1.3 * found.noise

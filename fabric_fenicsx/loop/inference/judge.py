@@ -18,6 +18,7 @@ from math import comb, log
 import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2, norm
+from scipy.stats import f as f_ratio
 
 from .criteria import CRITERIA
 from .effects import Effect, Variant
@@ -317,7 +318,8 @@ class Judge:
             count = int(model.fit.used.sum())
         noise = model.fit.variances.noise.typical(self._readings, model.fit.used)
         allowed = CRITERIA.roughly if roughly else CRITERIA.scatter
-        limit = max(allowed, self._by_chance(model, count))
+        # Held-out readings are compared with a noise that few others may be all that is known of.
+        limit = max(allowed, self._by_chance(model, count, of_others=bool(out.any())))
         return bool(error * noise <= limit * self.misfit(model).reading)
 
     def _known_of(self, model: Model) -> list[str]:
@@ -430,8 +432,20 @@ class Judge:
             found.append(Laboratory(int(folder[part][0]), model.rms(part), error, expected, size))
         return found
 
-    def _by_chance(self, model: Model, count: int) -> float:
-        """Scatter over noise that is exceeded by chance once in a thousand."""
+    def _by_chance(self, model: Model, count: int, *, of_others: bool = False) -> float:
+        """Scatter over noise that is exceeded by chance once in a thousand.
+
+        Args:
+            model: that leaves it.
+            count: of readings.
+            of_others: whether the noise is known from others alone, if it was not stated (F); up
+                to twice that.
+        """
         phi = model.estimate.variances.noise.correlation
-        independent = max(count * (1.0 - phi) / (1.0 + phi), 1.0)
+        share = (1.0 - phi) / (1.0 + phi)
+        independent = max(count * share, 1.0)
+        if of_others and self.given is None:
+            known = max(model.fit.freedom * share, 1.0)
+            ratio = float(np.sqrt(f_ratio.isf(1e-3, independent, known)))
+            return min(ratio, CRITERIA.significant)
         return float(np.sqrt(chi2.isf(1e-3, independent) / independent))
