@@ -122,6 +122,7 @@ class Models:
             self.variances,
             starts=starts,
             most=most,
+            kind=lambda one: frozenset(self.effect_of(v) for v, _ in one),
             robust=CRITERIA.far,
         )
         for model in found:

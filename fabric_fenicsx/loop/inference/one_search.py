@@ -375,7 +375,7 @@ class Search:
         The form that does best by itself stands for what the others do as well.
         """
         best = levels[-1][0]
-        if self.judge.settled(best, levels[0][0]):
+        if self._settled(best, levels[0][0]):
             return
         found: list[Fit] = []
         for effect in best.effects:

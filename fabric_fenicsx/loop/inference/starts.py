@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,12 +21,16 @@ from .variances import Variances
 __all__ = ["SMALL", "Combination", "Signature", "ToFirstOrder", "fit_combinations", "signatures"]
 
 Array = npt.NDArray[np.float64]
+T = TypeVar("T")
 
 #: Amplitudes are differentiated here rather than at zero, where |·| and friction have a corner.
 SMALL = 1e-9
 #: Combinations that are judged with their bounds, of as many as are wanted, and how many are looked
 #: at before that without them at once.
 LOOKED_AT, AT_ONCE = 6, 500
+#: Starts of a kind that are followed where not all kinds are, and how many times as many kinds are
+#: judged with their bounds.
+OF_A_KIND, SPARE = 2, 2
 #: Shares of a step to first order that a fit may begin with.
 DAMPED = (1.0, 0.3, 0.1, 0.0)
 #: Values of a parameter that the readings jump with, as shares of the one found; then nearer ones.
@@ -44,6 +49,7 @@ def fit_combinations(
     *,
     starts: int = 2,
     most: int | None = None,
+    kind: Callable[[Combination], Hashable] = lambda combination: (),
     evaluations: int = CRITERIA.evaluations,
     robust: float | None = None,
 ) -> list[Fit]:
@@ -58,7 +64,9 @@ def fit_combinations(
         combinations: forms with their shapes.
         variances: what readings and specimens scatter by.
         starts: how many starts of each combination of forms are followed.
-        most: how many starts are, of all; by default any number.
+        most: how many kinds of combinations are, by those that do best, each with no more than
+            OF_A_KIND starts; by default any number with any.
+        kind: of a combination: what effects it is of.
         evaluations: of the model at most, from each.
         robust: see fit.
 
@@ -67,16 +75,20 @@ def fit_combinations(
     """
     linear = ToFirstOrder(experiment, base, variances, robust)
     by_forms: dict[tuple[Variant, ...], list[_Start]] = {}
-    for combination in linear.most_promising(combinations, starts, most):
+    kinds: dict[tuple[Variant, ...], Hashable] = {}
+    for combination in linear.most_promising(combinations, starts, most, kind):
         start = linear.start(combination)
         if start is not None:
             forms = (*base.variants, *(v for v, _ in combination))
             by_forms.setdefault(forms, []).append(start)
+            kinds[forms] = kind(combination)
     promising: list[tuple[tuple[Variant, ...], _Start]] = []
     for forms, own in by_forms.items():
         own.sort(key=lambda start: start.left)
         promising += [(forms, start) for start in own[:starts]]
-    promising = sorted(promising, key=lambda one: one[1].left)[:most]
+    promising.sort(key=lambda one: one[1].left)
+    if most is not None:
+        promising = _of_most_kinds(promising, [kinds[forms] for forms, _ in promising], most)
     fits: list[Fit] = []
     followed: set[tuple[Variant, ...]] = set()
     for forms, start in promising:
@@ -107,6 +119,17 @@ def fit_combinations(
                 found = _again(experiment, found, found.values, evaluations, robust)
             fits[k] = _around_jumps(experiment, found, evaluations, robust)
     return fits
+
+
+def _of_most_kinds(found: Sequence[T], kinds: Sequence[Hashable], most: int) -> list[T]:
+    """Of the first kinds there are, so many of them, the first OF_A_KIND each."""
+    taken: Counter[Hashable] = Counter()
+    kept = []
+    for one, kind in zip(found, kinds, strict=True):
+        if taken[kind] < OF_A_KIND and (kind in taken or len(taken) < most):
+            taken[kind] += 1
+            kept.append(one)
+    return kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,14 +210,19 @@ class ToFirstOrder:
         return orthogonal_to(made, np.concatenate([columns, np.zeros((q, columns.shape[1]))]))
 
     def most_promising(
-        self, combinations: Sequence[Combination], starts: int, most: int | None
+        self,
+        combinations: Sequence[Combination],
+        starts: int,
+        most: int | None,
+        kind: Callable[[Combination], Hashable],
     ) -> list[Combination]:
         """Those that may be the best, as if nothing had bounds and no reading were far off.
 
         Args:
             combinations: forms with their shapes.
             starts: how many of each combination of forms are wanted.
-            most: how many are, of all; by default any number.
+            most: how many kinds of combinations are; by default any number.
+            kind: of a combination.
         """
         judged: list[Combination] = []
         chosen: list[Combination] = []
@@ -203,10 +231,14 @@ class ToFirstOrder:
             little = all(v.amplitudes and one.little(v) for v, one in combination)
             (judged if little else chosen).append(combination)
         lefts = self._unbounded(judged)
-        order = np.argsort(lefts, kind="stable")[: most and LOOKED_AT * most * starts]
-        taken: Counter[tuple[Variant, ...]] = Counter()
-        for k in order:
-            forms = tuple(v for v, _ in judged[k])
+        taken: Counter[Hashable] = Counter()
+        kinds: set[Hashable] = set()
+        for k in np.argsort(lefts, kind="stable"):
+            own = kind(judged[k])
+            if most is not None and own not in kinds and len(kinds) == SPARE * most:
+                continue
+            kinds.add(own)
+            forms = own if most is not None else tuple(v for v, _ in judged[k])
             taken[forms] += 1
             if taken[forms] <= LOOKED_AT * starts:
                 chosen.append(judged[k])

@@ -273,6 +273,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     even = coefficient(f"{name}_0")
     forms = [form("even", (even,), lambda p, x: p[even.name], "z", "scale")]
     forms += [form(*shape, "z", "scale") for shape in splines(name, SPLINES)]
+    forms.append(form(*wave(name), "z", "height"))
     forms += [form(*shape, "z", "height") for shape in places(name, SHARPEST)]
     yield strip_effect(name, "scale of heights", "reading", ("height",), forms)
 

@@ -36,6 +36,8 @@ __all__ = ["RIG_VARIABLES", "RigVariable", "of_the_rig", "rig_term", "rig_terms"
 CYCLES = {"time": 40.0, "displacement": 16.0, "force": 8.0}
 #: ... in time with overtones: more of them follow what is read too seldom.
 SWITCHED = 8.0
+#: How many: what is switched on and off has many.
+OVERTONES = (2, 5)
 #: Share of the largest speed below which its sign is rounded.
 SLOW = 1e-3
 #: ... and where a larger one is looked for, as a share of the speed.
@@ -346,10 +348,9 @@ def _gains(name: str, variable: str, reach: float) -> Iterator[tuple[str, dict[s
             yield label, numbers | {"coefficients": coefficients} | top
     if variable in CYCLES:
         # In time nothing need be a sine: what is switched is not.
-        overtones = (0, 2) if variable == "time" else (0,)
-        drawn = [*waves(name, CYCLES[variable], overtones), *bumps(name)]
+        drawn = [*waves(name, CYCLES[variable]), *bumps(name)]
         if variable == "time":
-            drawn += pulses(name)
+            drawn += [*waves(name, SWITCHED, OVERTONES), *pulses(name)]
         for label, coefficients, numbers in drawn:
             yield label, numbers | {"coefficients": coefficients}
 
@@ -403,6 +404,9 @@ def _added(
     few = 2 if seldom else wealth(name.partition("_")[0], variable)
     for label, coefficients, numbers in over(variable, name, few, reach):
         yield label, numbers | {"coefficients": coefficients} | constant
+    if variable == "displacement" and turning == "over a way":
+        for label, coefficients, numbers in bumps(name, between):
+            yield label, numbers | {"coefficients": coefficients} | constant
     if variable in CYCLES and not turning:
         for label, coefficients, numbers in bumps(name, between):
             yield label, numbers | {"coefficients": coefficients} | constant
@@ -410,6 +414,6 @@ def _added(
         zero = {"constant": Parameter(f"{name}_0", amplitude=True)}
         drawn = [*waves(name, CYCLES[variable])]
         if variable == "time":
-            drawn += [*waves(name, SWITCHED, (2,)), *pulses(name)]
+            drawn += [*waves(name, SWITCHED, OVERTONES), *pulses(name)]
         for label, coefficients, numbers in drawn:
             yield label, numbers | {"coefficients": coefficients} | zero

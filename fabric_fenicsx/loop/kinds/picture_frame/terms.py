@@ -270,7 +270,7 @@ def _laws(
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
     also = f", {base}" if base in ("smooth", "forward") else ""
     drawn = [*shapes(name, wealth(base, variable))]
-    if (base, variable) in FINE:
+    if (base, variable) in FINE or variable == "time":
         drawn += bumps(name)
     if variable == "time":
         drawn += pulses(name)
