@@ -72,6 +72,37 @@ def test_a_form_that_is_never_absent_is_judged_by_the_whole_of_it():
     assert found.rms(found.used) < 1e-6
 
 
+def test_where_not_all_are_followed_no_kind_has_all_the_starts():
+    """Many forms of one effect do not take the places of others that do a little worse."""
+    t = np.linspace(-1.0, 1.0, 40)
+    powers = {f"p{k}": t**2 + 0.05 * t**k for k in range(3, 9)}
+    columns = {"a": np.ones_like(t), "b": t, "cosine": np.cos(3.0 * t), "kink": np.abs(t)}
+    many = Effect(
+        "many",
+        "linear",
+        "",
+        tuple(Variant(name, (Parameter(name, amplitude=True),)) for name in powers),
+    )
+    effects = [many, effect("cosine", "cosine"), effect("kink", "kink")]
+    observed = 2.0 + t + 0.5 * t**2 + 0.1 * np.random.default_rng(3).normal(size=40)
+    test = Linear(readings(observed), columns | powers, ("a", "b"), effects=effects)
+    variances = Variances(NOISE)
+    base = fit(test, (), {"a": 1.0, "b": 1.0}, test.readings.fit, variances)
+    alike = test.predict((), base.values)
+    of = {v: e.name for e in effects for v in e.variants}
+    combos = [((v, s),) for v in of for s in signatures(test, base, *alike, v)]
+
+    def followed(most):
+        found = fit_combinations(
+            test, base, combos, variances, most=most, kind=lambda one: of[one[0][0]]
+        )
+        return [of[f.variants[-1]] for f in found]
+
+    assert followed(None).count("many") == len(powers)
+    assert sorted(followed(3)) == ["cosine", "kink", "many", "many"]
+    assert set(followed(1)) == {"many"}
+
+
 def left(test, base, names):
     """Sum of squares, deviations' penalty included, of least squares about the fit."""
     data, rows = test.readings, test.readings.fit

@@ -307,6 +307,14 @@ def test_whether_each_specimen_has_an_overhang_of_its_own(lengths, specimens, ow
     assert Cantilever([replace(plain, runs=runs)]).each_its_own_way is own
 
 
+@pytest.mark.parametrize(("lengths", "same"), [((LENGTH, 150.0), True), ((150.0, 150.0), False)])
+def test_zeros_by_the_run_and_by_the_overhang_may_be_the_same(lengths, same):
+    plain = strips((*lengths, 200.0), count=8)
+    plain = replace(plain, runs=tuple(replace(run, holdout=False) for run in plain.runs))
+    alike = Cantilever([plain]).alike
+    assert alike == (frozenset(("reading_of_run", "reading_of_length")) if same else frozenset())
+
+
 def test_zeros_of_runs_are_a_term(tmp_path):
     """With a table of the runs, and a file that has a zero of each run it is tried on."""
     zeros = (1.0, -2.0, 3.0, 0.5)
