@@ -276,7 +276,8 @@ class CrossheadTest:
         }
 
         def ends(values: Array) -> tuple[float, float]:
-            shares = values / np.abs(values).max()
+            largest = float(np.abs(values).max())
+            shares = values / largest if largest > 0.0 else values
             low, high = float(shares.min()), float(shares.max())
             return (low if low < -LITTLE else 0.0), (high if high > LITTLE else 0.0)
 
