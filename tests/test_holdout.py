@@ -32,6 +32,11 @@ def answer(measured):
     return diagnosed(measured)
 
 
+def put_in(seed, name, folder):
+    """Write a made-up set of another seed; what was put in."""
+    return next(recipe for recipe in sixty(seed) if recipe.name == name)(folder)
+
+
 def changed(measurement, change, holdout=(True, False)):
     """With other forces in the runs of some roles."""
     runs = tuple(
@@ -152,8 +157,7 @@ def test_held_out_runs_that_contradict_one_of_two_that_fit_alike_name_the_other(
     At the held-out rate they are not. What is nearest, by less than anybody knows, is contradicted
     there, so that nothing is claimed; nor is it that no effect explains it.
     """
-    recipe = next(recipe for recipe in sixty(72) if recipe.name == NAME)
-    recipe(tmp_path / "set")
+    put_in(72, NAME, tmp_path / "set")
     effects = ["crossover_friction", "crossover_relaxation"]
     found, report = diagnosed(read_measurement(tmp_path / "set"), effects)
     assert found.verdict == "unexplained"
@@ -166,8 +170,7 @@ def test_held_out_runs_that_contradict_one_of_two_that_fit_alike_name_the_other(
 
 def test_what_meets_held_out_runs_may_know_little_of_them(tmp_path):
     """The baseline, at one rate, is sure of what it is wrong about; friction is less sure."""
-    recipe = next(r for r in sixty(73) if r.name == "crossover_friction-stick")
-    truth = recipe(tmp_path / "set")
+    truth = put_in(73, "crossover_friction-stick", tmp_path / "set")
     found, _ = diagnosed(read_measurement(tmp_path / "set"), ["crossover_friction"])
     assert found.verdict == "effect_found"
     vague, sure = found.holdout_expected, found.baseline.prediction_std(found.baseline.used)
@@ -177,8 +180,7 @@ def test_what_meets_held_out_runs_may_know_little_of_them(tmp_path):
 
 def test_noise_that_sixty_readings_tell_is_not_known_to_a_quarter(tmp_path):
     """Nothing was put in, and the fitted run happens to scatter by less than the held-out one."""
-    recipe = next(r for r in sixty(73) if r.name == "none-shear-hold")
-    truth = recipe(tmp_path / "set")
+    truth = put_in(73, "none-shear-hold", tmp_path / "set")
     found, _ = diagnosed(read_measurement(tmp_path / "set"))
     assert found.verdict == "no_effect"
     assert found.noise < 0.8 * truth.noise and found.holdout_after > 1.3 * found.noise

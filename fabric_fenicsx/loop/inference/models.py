@@ -237,7 +237,8 @@ class Models:
         """
         known, self.forms = self.forms, {}
         self.base = self.baseline(self.base.values)
-        return [self._again_with(level, known) for level in levels]
+        found = [self._again_with(level, known) for level in levels]
+        return [level for level in found if level]
 
     def _again_with(
         self, level: Sequence[Model], known: Mapping[frozenset[Effect], Sequence[Fit]]

@@ -353,9 +353,8 @@ class Search:
         """
         tried = {frozenset(first.variants)}
         for _ in range(CRITERIA.exchanges):
-            self._with_one_less(levels)
-            whole = set(levels[-1][0].fit.variants)
-            kept = [frozenset(whole - {out}) for out in whole]
+            whole = levels[-1][0].fit.variants
+            kept = [frozenset(whole) - {out} for out in whole]
             bases = {frozenset(m.fit.variants): m for m in reversed(levels[-2])}
             own = [k for k in kept if k in bases and k not in tried]
             if not own:
@@ -367,6 +366,7 @@ class Search:
                 more = self._added_to(base)
                 found += self.models.fitted(more, starts=1, base=base, most=CRITERIA.terms)
             levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
+            self._with_one_less(levels)
         self._tried |= {frozenset(map(self.models.effect_of, kept)) for kept in tried}
 
     def _in_other_forms(self, levels: list[list[Model]]) -> None:

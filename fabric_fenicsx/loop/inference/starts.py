@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +20,6 @@ from .variances import Variances
 __all__ = ["SMALL", "Combination", "Signature", "ToFirstOrder", "fit_combinations", "signatures"]
 
 Array = npt.NDArray[np.float64]
-T = TypeVar("T")
 
 #: Amplitudes are differentiated here rather than at zero, where |·| and friction have a corner.
 SMALL = 1e-9
@@ -88,7 +86,7 @@ def fit_combinations(
         promising += [(forms, start) for start in own[:starts]]
     promising.sort(key=lambda one: one[1].left)
     if most is not None:
-        promising = _of_most_kinds(promising, [kinds[forms] for forms, _ in promising], most)
+        promising = _of_so_many_kinds(promising, kinds, most)
     fits: list[Fit] = []
     followed: set[tuple[Variant, ...]] = set()
     for forms, start in promising:
@@ -121,14 +119,19 @@ def fit_combinations(
     return fits
 
 
-def _of_most_kinds(found: Sequence[T], kinds: Sequence[Hashable], most: int) -> list[T]:
-    """Of the first kinds there are, so many of them, the first OF_A_KIND each."""
+def _of_so_many_kinds(
+    promising: Sequence[tuple[tuple[Variant, ...], _Start]],
+    kinds: Mapping[tuple[Variant, ...], Hashable],
+    most: int,
+) -> list[tuple[tuple[Variant, ...], _Start]]:
+    """Of the first kinds there are, so many of them, the first OF_A_KIND starts each."""
     taken: Counter[Hashable] = Counter()
     kept = []
-    for one, kind in zip(found, kinds, strict=True):
-        if taken[kind] < OF_A_KIND and (kind in taken or len(taken) < most):
-            taken[kind] += 1
-            kept.append(one)
+    for forms, start in promising:
+        own = kinds[forms]
+        if taken[own] < OF_A_KIND and (own in taken or len(taken) < most):
+            taken[own] += 1
+            kept.append((forms, start))
     return kept
 
 
@@ -231,17 +234,15 @@ class ToFirstOrder:
             little = all(v.amplitudes and one.little(v) for v, one in combination)
             (judged if little else chosen).append(combination)
         lefts = self._unbounded(judged)
+        # Places are shared by forms or, where not all kinds are wanted, by these.
         taken: Counter[Hashable] = Counter()
-        kinds: set[Hashable] = set()
-        for k in np.argsort(lefts, kind="stable"):
-            own = kind(judged[k])
-            if most is not None and own not in kinds and len(kinds) == SPARE * most:
+        for one in (judged[k] for k in np.argsort(lefts, kind="stable")):
+            own = tuple(v for v, _ in one) if most is None else kind(one)
+            if most is not None and own not in taken and len(taken) == SPARE * most:
                 continue
-            kinds.add(own)
-            forms = own if most is not None else tuple(v for v, _ in judged[k])
-            taken[forms] += 1
-            if taken[forms] <= LOOKED_AT * starts:
-                chosen.append(judged[k])
+            taken[own] += 1
+            if taken[own] <= LOOKED_AT * starts:
+                chosen.append(one)
         return chosen
 
     def _unbounded(self, combinations: Sequence[Combination]) -> Array:

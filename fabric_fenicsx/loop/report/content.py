@@ -310,7 +310,7 @@ def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
 
 def _parameters(d: Diagnosis) -> list[Parameter]:
     """Of every model in the report, each once."""
-    models = [d.final, *d.instead] if d.best is None else [d.final, d.best, *d.instead]
+    models = [model for model in (d.final, d.best, *d.instead) if model is not None]
     found = {p.name: p for model in models for p in parameters_of(d.experiment, model.variants)}
     return list(found.values())
 

@@ -180,17 +180,20 @@ class Cantilever:
     @property
     def each_its_own_way(self) -> bool:
         """Whether every specimen hung at one overhang, which no other one had."""
-        rows = self.readings.fit
-        pairs = np.unique(np.stack([self.readings.specimen[rows], self._length[rows]]), axis=1)
-        return all(len(np.unique(one)) == pairs.shape[1] for one in pairs)
+        return self._one_overhang_each(self.readings.specimen)
 
     @property
     def alike(self) -> frozenset[str]:  # type: ignore[override]
         """Zeros by the overhang and by the run, where either has one of the other."""
+        if self._one_overhang_each(self._run):
+            return frozenset(("reading_of_run", "reading_of_length"))
+        return frozenset()
+
+    def _one_overhang_each(self, of: npt.NDArray[np.int64]) -> bool:
+        """Whether every number of the fitted readings goes with one overhang, and that with it."""
         rows = self.readings.fit
-        pairs = np.unique(np.stack([self._run[rows], self._length[rows]]), axis=1)
-        one_each = all(len(np.unique(one)) == pairs.shape[1] for one in pairs)
-        return frozenset(("reading_of_run", "reading_of_length")) if one_each else frozenset()
+        pairs = np.unique(np.stack([of[rows], self._length[rows]]), axis=1)
+        return all(len(np.unique(one)) == pairs.shape[1] for one in pairs)
 
     @property
     def _distance(self) -> Array:

@@ -14,6 +14,7 @@ from ....mechanics.laws.law import size_of
 from ....mechanics.laws.shaped import recent, shape_of
 from ...inference.effects import Effect, Shape, Values, valued
 from .shapes import (
+    Drawn,
     Ends,
     X,
     Y,
@@ -347,12 +348,16 @@ def _gains(name: str, variable: str, reach: float) -> Iterator[tuple[str, dict[s
             top = {"from_the_top": True} if of_the_force else {}
             yield label, numbers | {"coefficients": coefficients} | top
     if variable in CYCLES:
-        # In time nothing need be a sine: what is switched is not.
-        drawn = [*waves(name, CYCLES[variable]), *bumps(name)]
-        if variable == "time":
-            drawn += [*waves(name, SWITCHED, OVERTONES), *pulses(name)]
-        for label, coefficients, numbers in drawn:
+        for label, coefficients, numbers in (*bumps(name), *_courses(name, variable)):
             yield label, numbers | {"coefficients": coefficients}
+
+
+def _courses(name: str, variable: str) -> Iterator[Drawn]:
+    """Waves; in time nothing need be a sine, what is switched is not, nor go on for ever."""
+    yield from waves(name, CYCLES[variable])
+    if variable == "time":
+        yield from waves(name, SWITCHED, OVERTONES)
+        yield from pulses(name)
 
 
 def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
@@ -404,16 +409,12 @@ def _added(
     few = 2 if seldom else wealth(name.partition("_")[0], variable)
     for label, coefficients, numbers in over(variable, name, few, reach):
         yield label, numbers | {"coefficients": coefficients} | constant
-    if variable == "displacement" and turning == "over a way":
+    goes_on = variable in CYCLES and not turning
+    if goes_on or (variable, turning) == ("displacement", "over a way"):
         for label, coefficients, numbers in bumps(name, between):
             yield label, numbers | {"coefficients": coefficients} | constant
-    if variable in CYCLES and not turning:
-        for label, coefficients, numbers in bumps(name, between):
-            yield label, numbers | {"coefficients": coefficients} | constant
+    if goes_on:
         # Where a run begins a wave may be anywhere.
         zero = {"constant": Parameter(f"{name}_0", amplitude=True)}
-        drawn = [*waves(name, CYCLES[variable])]
-        if variable == "time":
-            drawn += [*waves(name, SWITCHED, OVERTONES), *pulses(name)]
-        for label, coefficients, numbers in drawn:
+        for label, coefficients, numbers in _courses(name, variable):
             yield label, numbers | {"coefficients": coefficients} | zero
