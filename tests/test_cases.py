@@ -71,6 +71,14 @@ def test_a_setting_leaves_an_anchor_alone(tmp_path):
         ("sheet: {width_mm: null}", "sheet.width_mm: null, allowed is a number greater than 0"),
         ("punch_travel_mm: .nan", "punch_travel_mm: nan, allowed is a number greater than 0"),
         ("punch_travel_mm: -.inf", "punch_travel_mm: -inf, allowed is a number greater than 0"),
+        (
+            "tow: {height_mm: 1.0e+300}",
+            "tow.height_mm: 1e+300, allowed is a number greater than 0, ",
+        ),
+        (
+            "tow: {height_mm: 1.0e-99}",
+            "height_mm: 1e-99, allowed is a number greater than 0, 1e-30",
+        ),
         ("holder_gap_mm: nan", "holder_gap_mm: 'nan', allowed is a number"),
         ("sheet: {subdivisions: 1.5}", "subdivisions: 1.5, allowed is a whole number from 1 to 64"),
         ("sheet: {subdivisions: 0}", "subdivisions: 0, allowed is a whole number from 1 to 64"),

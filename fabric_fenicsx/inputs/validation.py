@@ -11,6 +11,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from ..errors import InputError
+from .groups import LARGEST
 from .keys import allowed, allowed_by, group_of, one_of, plain, variants
 
 __all__ = [
@@ -193,6 +194,8 @@ def _explained(model: type[BaseModel], problem: dict[str, Any]) -> tuple[Place, 
         reason = str(problem["ctx"]["error"])
         return place, f"{dotted_place(place)}: {reason}" if place else reason
     shown = "missing" if kind == "missing" else plain(value)
+    if kind == "size":
+        words = f"{words}, {1.0 / LARGEST:g} to {LARGEST:g} in size"
     if group is not None and words is None:
         words = "a group of keys"
     return place, f"{dotted_place(place)}: {shown}, allowed is {words or problem['msg']}"
