@@ -53,7 +53,7 @@ class Linear:
     """
 
     test, quantity, notes, one_curve = "linear", "force_N", (), None
-    curves_only = False
+    curves_only = each_its_own_way = False
     alike = frozenset()
     imitated = MappingProxyType({})
 

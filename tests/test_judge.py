@@ -10,6 +10,7 @@ from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.judge import Judge
+from fabric_fenicsx.loop.inference.models import cancelling
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.one_search import Search
 from fabric_fenicsx.loop.inference.search import diagnose_test
@@ -17,6 +18,7 @@ from fabric_fenicsx.loop.inference.variances import Variances
 
 #: One sigma of a reading.
 SIGMA = 0.1
+NOISE = Variances(Noise(SIGMA))
 #: Of a wave.
 WAVE = Parameter("wave", (), amplitude=True)
 
@@ -265,3 +267,31 @@ def test_terms_beside_slow_noise_are_not_the_end_of_the_search(acts_on, correlat
     slow = replace(model, estimate=replace(model.estimate, variances=variances))
     without = fit(test, (), {"a": 2.0, "b": 1.0}, test.readings.fit, Variances(Noise(SIGMA)))
     assert search._settled(slow, judge.weighed(without, ())) is settled
+
+
+@pytest.mark.parametrize(
+    ("own_way", "more", "settled"), [(0, 1.3, True), (1, 1.3, False), (1, 1, True)]
+)
+def test_what_specimens_differ_by_may_be_a_further_effect(own_way, more, settled):
+    """Where each was tested in a way of its own, and more is left than noise may be."""
+    judge, model = judged(stated=SIGMA / more)
+    judge.experiment.each_its_own_way = bool(own_way)
+    search = Search(judge.experiment, judge.experiment.effects, lambda done, what: None)
+    without = judge.weighed(fit(judge.experiment, (), {"a": 2.0, "b": 1.0}, judge.rows, NOISE), ())
+    differs = replace(model, fit=replace(model.fit, deviations={"a": np.array([0.1])}))
+    assert search._settled(model, without)
+    assert search._settled(differs, without) is settled
+
+
+def test_parts_that_cancel_are_no_effect():
+    """Two columns that are all but the same, of which a million and its opposite are left."""
+    t = np.linspace(0.0, 1.0, 60)
+    columns = {"a": np.ones_like(t), "one": t, "other": t + 1e-6 * t**2}
+    own = tuple(Parameter(name, amplitude=True) for name in ("one", "other"))
+    form = Variant("both", own)
+    for size in (1.0, 1e6):
+        values = {"a": 2.0, "one": size, "other": 1.0 - size}
+        observed = sum(value * columns[name] for name, value in values.items())
+        test = Linear(readings(observed), columns, ("a",))
+        model = fit(test, (form,), values, test.readings.fit, NOISE)
+        assert cancelling(model) is (size > 1.0)

@@ -113,6 +113,7 @@ def test_memories_fade():
         ("bump", (0.4, -0.6), {"place": 0.4, "width": 0.1}),
         ("peak", (0.4,), {"place": 0.3, "width": 0.5}),
         ("pulse", (0.4,), {"place": 0.4, "width": 0.1}),
+        ("window", (0.4,), {"place": 0.3, "width": 0.05, "span": 0.2}),
         ("sign", (0.4,), {"width": 1e-3}),
         ("sides", (0.4, -0.6), {}),
         ("saturating sides", (0.4, -0.6), {"width": 0.2}),

@@ -74,6 +74,8 @@ class Criteria:
         most_terms: in one model, terms without a formula among them; convention.
         as_little, without_formula: error over that of a term without a formula up to which
             another term is its rival if it loses by so many times ``decisive``; convention.
+        cancelling: readings, all together, that a single part of an effect may be as large as; more
+            only where it cancels with others; convention.
         pairs: of rivals, for which a further test is looked for; convention.
         rounds: times that readings are left out, from ever better models; made-up.
         said_correlation: of neighbouring readings, above which the report names it; convention.
@@ -94,7 +96,7 @@ class Criteria:
     outlier: float = 6.0
     outlier_steps: float = 3.0
     missed: float = 6.0
-    most_missed: float = 0.03
+    most_missed: float = 0.05
     structure_p: float = 1e-3
     hopeless_p: float = 1e-8
     other_form: float = 0.06
@@ -126,6 +128,7 @@ class Criteria:
     most_terms: int = 2
     as_little: float = 1.02
     without_formula: float = 3.0
+    cancelling: float = 1e3
     pairs: int = 4
     rounds: int = 2
     said_correlation: float = 0.15

@@ -115,7 +115,7 @@ class Models:
 
         See fit_combinations.
         """
-        found = fit_combinations(
+        every = fit_combinations(
             self.experiment,
             base or self.base,
             combinations,
@@ -125,6 +125,7 @@ class Models:
             kind=lambda one: frozenset(self.effect_of(v) for v, _ in one),
             robust=CRITERIA.far,
         )
+        found = [model for model in every if not cancelling(model)]
         for model in found:
             effects = frozenset(self.effects_of(model))
             self.forms.setdefault(effects, []).append(model)
@@ -306,6 +307,20 @@ def nothing_left(model: Fit) -> bool:
     names = [{p.name for p in v.amplitudes} for v in model.variants]
     # What is never absent has no amplitude.
     return any(own and own <= gone for own in names)
+
+
+def cancelling(model: Fit) -> bool:
+    """Whether parts of an effect by far larger than the readings cancel in these.
+
+    What such parts leave elsewhere is anything: the readings tell nothing of the effect's shape.
+    """
+    observed = np.linalg.norm(model.readings.observed[model.used])
+    place = {name: k for k, name in enumerate(model.values)}
+    names = [p.name for v in model.variants for p in v.amplitudes]
+    parts = [
+        abs(model.values[n]) * np.linalg.norm(model.slopes[model.used, place[n]]) for n in names
+    ]
+    return bool(max(parts, default=0.0) > CRITERIA.cancelling * observed)
 
 
 def nearest_forms(fits: Sequence[Fit]) -> list[Fit]:

@@ -238,9 +238,17 @@ class Search:
         return candidates, levels
 
     def _settled(self, model: Model, baseline: Model) -> bool:
-        """Whether nothing more is looked for: of terms only where their noise is not in doubt."""
-        doubtful = self._screened_first and self.judge.doubtful_noise(model)
-        return self.judge.settled(model, baseline) and not doubtful
+        """Whether nothing more is looked for.
+
+        Of terms only where their noise is not in doubt. And where specimens differ, each of which
+        was tested in a way of its own, what they differ by may be a further effect.
+        """
+        if not self.judge.settled(model, baseline):
+            return False
+        if self._screened_first:
+            return not self.judge.doubtful_noise(model)
+        differ = self.experiment.each_its_own_way and bool(model.effects and model.fit.deviations)
+        return not differ or self.judge.enough(model, baseline)
 
     def _over_two_variables(self, candidates: list[Candidate]) -> list[Model]:
         """Models of the most promising terms over two variables, which join the candidates."""

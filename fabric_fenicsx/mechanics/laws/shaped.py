@@ -42,6 +42,7 @@ Kind = Literal[
     "bump",
     "peak",
     "pulse",
+    "window",
 ]
 Base = Literal[
     "elastic",
@@ -167,6 +168,7 @@ def shape_of(
     place: Any = 0.5,
     width: Any = 0.1,
     ends: tuple[float, float] = (0.0, 1.0),
+    span: Any = 0.3,
 ) -> Any:
     """A function of x, from 0 to 1 or on both sides of 0, that is 0 at 0.
 
@@ -179,7 +181,7 @@ def shape_of(
             c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1), and overtones;
             "bump", (c₁ + c₂ y) e^(−y²) with y = (x − x₀)/w, less what that is at 0; "peak",
             c e^(−y²) with y = ln(x/x₀)/w; "pulse", c e^(−(x − x₀)/w) from x₀ on, where it begins
-            within ONSET;
+            within ONSET; "window", a step at x₀ and the same step back a span later;
             "sign", c tanh(x/w); "sides", c₁ x + c₂ |x|, each side of 0 with a slope of its own;
             "saturating sides", c₁ f(x) for x > 0 and c₂ f(−x) for x < 0 with f of a saturation, and
             "power sides" with |x|^w.
@@ -188,13 +190,15 @@ def shape_of(
         place: x₀ of a step or a bump.
         width: w.
         ends: between which the pieces of a spline lie.
+        span: of a window.
     """
     c = coefficients
     if not len(c):
         return 0.0
     if kind == "step":
-        start = 1 / (1 + exp(place / width))
-        return c[0] * (1 / (1 + exp(-(x - place) / width)) - start)
+        return c[0] * _step(x, place, width)
+    if kind == "window":
+        return c[0] * (_step(x, place, width) - _step(x, place + span, width))
     if kind == "saturation":
         return c[0] * _saturation(x, width)
     if kind == "hyperbola":
@@ -226,6 +230,11 @@ def shape_of(
     for c_k, knot in zip(c[2:], GRADED if kind == "graded" else even, strict=True):
         value = value + c_k * max_value(knot - x if knot < 0.0 else x - knot, 0) ** 2
     return value
+
+
+def _step(x: Any, place: Any, width: Any) -> Any:
+    """From 0 at 0 to about 1 beyond the place."""
+    return 1 / (1 + exp(-(x - place) / width)) - 1 / (1 + exp(place / width))
 
 
 def _saturation(x: Any, width: Any) -> Any:
@@ -295,7 +304,7 @@ class ShapedLaw(CrossingLaw):
             viscous base, else [N mm].
         constant: c₀, as they are.
         shape: one of those of ``shape_of`` that Kind names.
-        place, width: its x₀ and w, as shares of v_max.
+        place, width, span: its x₀, w and span, as shares of v_max.
         k1, k3: of the elastic moment [N mm].
         stick_angle: δ, of a friction [rad].
         exponent, flow_rate: n > 1 and r [rad/s], of one that flows.
@@ -317,6 +326,7 @@ class ShapedLaw(CrossingLaw):
     shape: Kind = number("shape", "of the factor", Kind, "spline")
     place: Any = number("place", "of a step, as a share of the reach", NotNegative, 0.5)
     width: Any = number("width", "of a step, saturation or wave, as a share of it", Positive, 0.1)
+    span: Any = number("span", "of a window, as a share of it", Positive, 0.3)
     k1: Any = per_area("k1_N_mm", "linear part of the elastic base", NotNegative, 0.0)
     k3: Any = per_area("k3_N_mm", "cubic part of the elastic base", NotNegative, 0.0)
     stick_angle: Any = in_degrees("stick_angle_deg", "of a friction", default=0.5)
@@ -380,10 +390,10 @@ class ShapedLaw(CrossingLaw):
         """c₀ + f at the end of the step."""
         x = min_value(self.variable_at(at) / at.number(self.reach), 1)
         parts, constants = (each(at, numbers) for numbers in (self.coefficients, self.constants))
-        place, width = (at.number(n) for n in (self.place, self.width))
+        place, width, span = (at.number(n) for n in (self.place, self.width, self.span))
         constant = at.number(self.constant)
         if self.also is None:
-            return constant + shape_of(self.shape, parts, x, place, width)
+            return constant + shape_of(self.shape, parts, x, place, width, span=span)
         w = min_value(self._also_at(at) / at.number(self.also_reach), 1)
         powers = tuple(self.powers)
         return constant + product_of(self.shape, parts, x, w, powers, constants, place, width)

@@ -28,6 +28,7 @@ from .shapes import (
     shapes,
     waves,
     wealth,
+    windows,
 )
 from .variant import FrameVariant
 
@@ -358,6 +359,7 @@ def _courses(name: str, variable: str) -> Iterator[Drawn]:
     if variable == "time":
         yield from waves(name, SWITCHED, OVERTONES)
         yield from pulses(name)
+        yield from windows(name)
 
 
 def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:

@@ -34,6 +34,7 @@ __all__ = [
     "shapes",
     "waves",
     "wealth",
+    "windows",
 ]
 
 #: Numbers of coefficients of a spline; the last one of what a place may have to itself.
@@ -57,6 +58,9 @@ DECAYS = (0.1, 0.3)
 BENDS = (0.01, 0.1)
 #: Likewise of what rises and falls again, whose width is that of a logarithm.
 TOPS, TOP_WIDTHS = (0.05, 0.15, 0.4, 0.7), (0.5,)
+#: Likewise of what is there for a while, how long that is, and how soon it begins and ends.
+BEGINNINGS, SPANS = tuple((0.1 * np.arange(9)).tolist()), (0.1, 0.25, 0.5)
+EDGES = (0.02,)
 #: Decays of what begins somewhere.
 FADING = (0.05, 0.2)
 #: Steps of how many cycles a wave is looked for with: closer together two are alike.
@@ -143,7 +147,7 @@ def factor(numbers: Mapping[str, Any], values: Values, x: Any) -> Any:
     """A law's factor, or what is added, at a share x of the reach."""
     own = {key: valued(n, values) for key, n in numbers.items()}
     shape = own.pop("shape"), own.pop("coefficients")
-    at = {key: own[key] for key in ("place", "width", "ends") if key in own}
+    at = {key: own[key] for key in ("place", "width", "ends", "span") if key in own}
     top = shape_of(*shape, 1.0, **at) if own.get("from_the_top") else 0.0
     return own.get("constant", 0.0) - top + shape_of(*shape, x, **at)
 
@@ -265,6 +269,15 @@ def pulses(name: str) -> Iterator[Drawn]:
     place = Parameter(f"{name}_place", BUMPS, 0.0, 1.0)
     fading = Parameter(f"{name}_fading", FADING, 0.01, 1.0)
     yield "pulse", one, {"shape": "pulse", "place": place, "width": fading}
+
+
+def windows(name: str) -> Iterator[Drawn]:
+    """What is there for a while: as shapes."""
+    one = (Parameter(f"{name}_1", amplitude=True),)
+    place = Parameter(f"{name}_place", BEGINNINGS, 0.0, 1.0)
+    span = Parameter(f"{name}_span", SPANS, 0.01, 1.5)
+    edge = Parameter(f"{name}_edge", EDGES, 0.002, 0.3)
+    yield "window", one, {"shape": "window", "place": place, "span": span, "width": edge}
 
 
 def both_sides(name: str) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -34,6 +34,7 @@ from .shapes import (
     shapes,
     waves,
     wealth,
+    windows,
 )
 from .variant import FrameVariant
 
@@ -273,7 +274,7 @@ def _laws(
     if (base, variable) in FINE or variable == "time":
         drawn += bumps(name)
     if variable == "time":
-        drawn += pulses(name)
+        drawn += [*pulses(name), *windows(name)]
     if (base, variable) in CYCLES:
         drawn += waves(name, CYCLES[base, variable], OVERTONES.get(variable, (0,)))
     for label, coefficients, numbers in drawn:
