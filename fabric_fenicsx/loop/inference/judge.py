@@ -11,7 +11,7 @@ was not; noise is what is printed. Holdout runs are looked at for that alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import comb, log
 
@@ -355,18 +355,33 @@ class Judge:
         slack = 1.0 + 0.5 / np.sqrt(max(int(model.fit.used.sum()), 1))
         return bool(mine * own[0] < slack * other * own[1])
 
-    def significant(self, model: Model) -> bool:
+    def significant(self, model: Model, fewer: Sequence[Model] = ()) -> bool:
         """Whether every effect's amplitudes, together, are more than their standard errors.
 
-        For its shape as it was found: without the effect there would be none.
+        For its shape as it was found: without the effect there would be none. What a term without
+        a formula has as a factor of the elastic law others of its numbers seem to make up for, if
+        it is large; that they cannot is seen where they were fitted without it.
+
+        Args:
+            model: the model.
+            fewer: models of one effect less.
         """
 
-        def significant(variant: Variant) -> bool:
-            names = [p.name for p in variant.amplitudes]
-            size = model.fit.wald(names, [p.name for p in variant.shapes])
-            return bool(chi2.sf(size, len(names)) < 2.0 * norm.sf(CRITERIA.significant))
+        def significant(effect: Effect, variant: Variant) -> bool:
+            own = [p.name for p in variant.amplitudes]
 
-        return all(significant(variant) for variant in model.fit.variants)
+            def beyond(known: Iterable[str]) -> bool:
+                size = model.fit.wald(own, [*known])
+                return bool(chi2.sf(size, len(own)) < 2.0 * norm.sf(CRITERIA.significant))
+
+            if effect.listed or beyond(p.name for p in variant.shapes):
+                return beyond(p.name for p in variant.shapes)
+            kept = set(model.effects) - {effect}
+            without = [m.criterion for m in fewer if set(m.effects) == kept]
+            needed = min(without, default=-np.inf) > model.criterion + CRITERIA.decisive
+            return needed and beyond(name for name in model.fit.values if name not in own)
+
+        return all(map(significant, model.effects, model.fit.variants))
 
     def holdout(self, model: Fit, rows: Flags | None = None) -> float:
         """Held-out error: of the holdout runs, or of each part predicted from the others.

@@ -414,16 +414,23 @@ class Search:
             enough = count and not doubtful and self.judge.enough(level[0], levels[0][0])
             if beaten and not enough:
                 continue
-            model = level[0]
-            fewer = levels[count - 1][0] if count else None
-            while fewer is not None and not (
-                self.judge.significant(model) and self.judge.improves(model, fewer)
-            ):
+            while count:
+                found = self._bearing_scrutiny(levels[count], levels[count - 1])
+                if found is not None:
+                    return found
                 count -= 1
-                model = levels[count][0]
-                fewer = levels[count - 1][0] if count else None
-            return model
+            return levels[0][0]
         return levels[-1][0]
+
+    def _bearing_scrutiny(self, level: Sequence[Model], fewer: Sequence[Model]) -> Model | None:
+        """The best model of a level in the best of its forms that can be claimed; None without."""
+        best = level[0]
+        for model in level:
+            near = model.criterion < best.criterion + CRITERIA.decisive
+            if near and set(model.effects) == set(best.effects):
+                if self.judge.significant(model, fewer) and self.judge.improves(model, fewer[0]):
+                    return model
+        return None
 
     def _verdict(self, baseline: Model, chosen: Model) -> Verdict:
         if not chosen.effects:

@@ -259,8 +259,9 @@ def product_of(
     constants: Any = (),
     place: Any = 0.5,
     width: Any = 0.1,
+    drift: Any = 0.0,
 ) -> Any:
-    """A function of two variables, Σ_p w^p (a_p + f_p(x)), w not negative.
+    """A function of two variables, Σ_p w^p (a_p + f_p(x + v w)), w not negative.
 
     Args:
         kind: of all f_p; see ``shape_of``, as of what follows.
@@ -271,7 +272,9 @@ def product_of(
         constants: a_p; none are all nothing.
         place: x₀ of all f_p.
         width: likewise, of all f_p.
+        drift: v, by how much f_p has moved along x where w is 1.
     """
+    x = x + drift * w
     each = len(coefficients) // len(powers)
     value = 0
     for k, power in enumerate(powers):
@@ -287,7 +290,8 @@ class ShapedLaw(CrossingLaw):
 
     f is 0 at 0 (see ``shape_of``), and beyond v_max what it is there: nobody has seen more. Where
     c₀ + f is negative the crossing gives energy away; it is to be had from measurements. Of two
-    variables f is Σ_p (w/w_max)^p (a_p + f_p(v/v_max)), see ``product_of``.
+    variables f is Σ_p (w/w_max)^p (a_p + f_p(v/v_max)), where f_p may move along v with w, see
+    ``product_of``.
 
     Attributes:
         base: of what it is a factor: "elastic" k₁ γ + k₃ γ³, "viscous" γ̇, "dissipative" a friction
@@ -313,6 +317,7 @@ class ShapedLaw(CrossingLaw):
         also_reach: w_max [rad, rad/s or s].
         powers: p; ``coefficients`` has those of f_p for each in turn.
         constants: a_p, in the unit of the coefficients; none are all nothing.
+        drift: by how much f_p has moved along v/v_max where w is w_max [-]; None stays.
 
     Raises:
         ValueError: the numbers of coefficients, powers and constants do not go together.
@@ -324,7 +329,7 @@ class ShapedLaw(CrossingLaw):
     coefficients: Any = number("coefficients", "of the factor, per area", list[float])
     constant: Any = number("constant", "of the factor where the variable is nothing", float, 0.0)
     shape: Kind = number("shape", "of the factor", Kind, "spline")
-    place: Any = number("place", "of a step, as a share of the reach", NotNegative, 0.5)
+    place: Any = number("place", "of a step, as a share of the reach", float, 0.5)
     width: Any = number("width", "of a step, saturation or wave, as a share of it", Positive, 0.1)
     span: Any = number("span", "of a window, as a share of it", Positive, 0.3)
     k1: Any = per_area("k1_N_mm", "linear part of the elastic base", NotNegative, 0.0)
@@ -337,6 +342,9 @@ class ShapedLaw(CrossingLaw):
     also_reach: Any = number("also_reach", "its largest value that was seen", default=1.0)
     powers: Any = number("powers", "of it, each with coefficients", list[NotNegative], [])
     constants: Any = number("constants", "of the factor, for each power", list[float], [])
+    drift: Any = number(
+        "drift", "of the shape along the variable, by the other one", float | None, None
+    )
 
     law = "shaped"
 
@@ -395,8 +403,10 @@ class ShapedLaw(CrossingLaw):
         if self.also is None:
             return constant + shape_of(self.shape, parts, x, place, width, span=span)
         w = min_value(self._also_at(at) / at.number(self.also_reach), 1)
-        powers = tuple(self.powers)
-        return constant + product_of(self.shape, parts, x, w, powers, constants, place, width)
+        drift = 0.0 if self.drift is None else at.number(self.drift)
+        return constant + product_of(
+            self.shape, parts, x, w, tuple(self.powers), constants, place, width, drift
+        )
 
     def moment(self, at: Crossing) -> Any:
         """The base times the factor, or what a shifted state of rest changes."""

@@ -23,6 +23,7 @@ from .shapes import (
     Y,
     bumps,
     fitted,
+    moving,
     of_powers,
     product,
     remembered_since,
@@ -68,6 +69,9 @@ GROWING = ((1,), (0, 1, 2))
 """Powers of a history in whose course something at an angle comes, or comes and goes."""
 
 BY = (*HISTORIES, "relative_angle", "rate", "unloading", *FORGETFUL)
+
+WAVES = 8.0
+"""Most over the angles, of those that move."""
 
 KINDS = (
     _Kind("odd", "angle", ((1,), (1, 3), (1, 2, 3)), BY, 4, turned=GROWING),
@@ -147,6 +151,16 @@ def _turned(
             if label in AT_AN_ANGLE and coefficients is not None:
                 own = fixed | numbers | {"coefficients": coefficients}
                 yield _form(f"{kind.also}, {label}, {said}", own, "", None)
+    if kind.turned and history in HISTORIES:
+        own = {"base": kind.base, "variable": kind.also, "also": history, "powers": (0,)}
+        own |= {"reach": largest[kind.also], "also_reach": largest[history]}
+        own |= remembering(name, kind.base, kind.also, largest)
+        if kind.base != "viscous":
+            own["constants"] = (Parameter(f"{name}_0_0", amplitude=True),)
+        for label, one, numbers in moving(name, WAVES, step=1.0):
+            every = own | numbers | {"coefficients": one}
+            said = f"with the {history.replace('_', ' ')}"
+            yield _form(f"{kind.also}, {label} {said}", every, "", None)
 
 
 def _shapes(

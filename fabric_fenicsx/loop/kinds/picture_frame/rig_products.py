@@ -16,8 +16,8 @@ from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ...inference.effects import Effect, Shape, Values
-from .rig_terms import of_the_rig, rig_term
-from .shapes import X, Y, fitted, of_powers, over, product
+from .rig_terms import CYCLES, of_the_rig, rig_term
+from .shapes import X, Y, fitted, moving, of_powers, over, product
 from .variant import FrameVariant
 
 __all__ = ["rig_products"]
@@ -50,6 +50,14 @@ PRODUCTS: dict[str, dict[tuple[str, str], tuple[str, str, Powers]]] = {
 """What acts on the reading and the travel: names in a report; w, v and sets of powers of w."""
 
 
+MOVING = {
+    ("reading", "displacement", "time"): ("time", "displacement"),
+    ("travel", "displacement", "time"): ("time", "displacement"),
+    ("reading", "displacement", "rate"): ("speed", "displacement"),
+}
+"""Those whose shape over v moves with w, (w, v)."""
+
+
 def rig_products(largest: Mapping[str, float]) -> Iterator[Effect]:
     """The terms.
 
@@ -60,7 +68,10 @@ def rig_products(largest: Mapping[str, float]) -> Iterator[Effect]:
         for names, (w, v, powers) in kinds.items():
             if w in largest and v in largest:
                 name = f"{acts_on}_of_{names[0]}_and_{names[1]}"
-                forms = (f for some in powers for f in _forms(acts_on, name, w, v, some, largest))
+                forms = [f for some in powers for f in _forms(acts_on, name, w, v, some, largest)]
+                if (acts_on, *names) in MOVING:
+                    along = MOVING[acts_on, *names]
+                    forms += _forms(acts_on, name, *along, (0,), largest, moves=True)
                 yield replace(rig_term(acts_on, name, names, forms), of_two=True)
 
 
@@ -71,8 +82,11 @@ def _forms(
     v: str,
     powers: tuple[int, ...],
     largest: Mapping[str, float],
+    *,
+    moves: bool = False,
 ) -> Iterator[FrameVariant]:
-    for label, one, numbers in over(v, name, 3, largest[v]):
+    drawn = moving(name, CYCLES[v]) if moves else over(v, name, 3, largest[v])
+    for label, one, numbers in drawn:
         coefficients = of_powers(name, powers, one)
         if coefficients is None:
             continue
@@ -80,7 +94,7 @@ def _forms(
         own = {**numbers, "powers": powers, "coefficients": coefficients, "constants": constants}
         reach, also_reach = largest[v], largest[w]
         yield of_the_rig(
-            f"{label}, powers {', '.join(map(str, powers))}",
+            label if moves else f"{label}, powers {', '.join(map(str, powers))}",
             fitted(own),
             acts_on,
             v,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ __all__ = [
     "factor",
     "fitted",
     "memory_of",
+    "moving",
     "of_powers",
     "over",
     "over_runs",
@@ -61,6 +63,10 @@ TOPS, TOP_WIDTHS = (0.05, 0.15, 0.4, 0.7), (0.5,)
 #: Likewise of what is there for a while, how long that is, and how soon it begins and ends.
 BEGINNINGS, SPANS = tuple((0.1 * np.arange(9)).tolist()), (0.1, 0.25, 0.5)
 EDGES = (0.02,)
+#: Places and a width of what moves, and how far it does, as shares of the range; of waves, which
+#: are alike a period further, more of these.
+STOPS, STOP_WIDTHS, DRIFTS = (0.1, 0.3, 0.5, 0.7, 0.9), (0.1,), (-0.4, -0.12, 0.12, 0.4)
+WAVE_DRIFTS = (-0.6, -0.3, -0.15, -0.07, 0.07, 0.15, 0.3, 0.6)
 #: Decays of what begins somewhere.
 FADING = (0.05, 0.2)
 #: Steps of how many cycles a wave is looked for with: closer together two are alike.
@@ -168,7 +174,7 @@ def of_powers(
 def product(numbers: Mapping[str, Any], values: Values, x: Any, w: Any) -> Any:
     """What ``factor`` is of one variable, of two: at shares x and w of their reaches."""
     own = {key: valued(n, values) for key, n in numbers.items()}
-    more = {key: own[key] for key in ("constants", "place", "width") if key in own}
+    more = {key: own[key] for key in ("constants", "place", "width", "drift") if key in own}
     return product_of(own["shape"], own["coefficients"], x, w, own["powers"], **more)
 
 
@@ -234,9 +240,11 @@ def shapes(name: str, wealth: int) -> Iterator[Drawn]:
         yield "peak", one, {"shape": "peak", "place": top, "width": wide}
 
 
-def waves(name: str, most: float, overtones: Sequence[int] = (0,)) -> Iterator[Drawn]:
+def waves(
+    name: str, most: float, overtones: Sequence[int] = (0,), step: float = STEP
+) -> Iterator[Drawn]:
     """Waves with at most so many cycles over the range, and so many overtones each: as shapes."""
-    periods = tuple((1.0 / np.arange(most, 1.0, -STEP)).tolist())
+    periods = tuple((1.0 / np.arange(most, 1.0, -step)).tolist())
     period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
     for more in overtones:
         own = [
@@ -278,6 +286,27 @@ def windows(name: str) -> Iterator[Drawn]:
     span = Parameter(f"{name}_span", SPANS, 0.01, 1.5)
     edge = Parameter(f"{name}_edge", EDGES, 0.002, 0.3)
     yield "window", one, {"shape": "window", "place": place, "span": span, "width": edge}
+
+
+def moving(name: str, cycles: float, step: float = STEP) -> Iterator[Drawn]:
+    """What is at a place, or a wave, that moves along with something else: as shapes.
+
+    Args:
+        name: of the term.
+        cycles: most of a wave.
+        step: of these, from one that is looked for to the next.
+    """
+    place = Parameter(f"{name}_place", STOPS, -1.0, 2.0)
+    width = Parameter(f"{name}_width", STOP_WIDTHS, 0.005, 0.5)
+    drift = Parameter(f"{name}_drift", DRIFTS, -2.0, 2.0)
+    about = {"place": place, "width": width, "drift": drift}
+    own = tuple(Parameter(f"{name}_{of}", amplitude=True) for of in ("there", "across"))
+    yield "bump that moves", own, {"shape": "bump", **about}
+    one = (Parameter(f"{name}_1", amplitude=True),)
+    yield "step that moves", one, {"shape": "step", **about}
+    further = replace(drift, starts=WAVE_DRIFTS)
+    for label, coefficients, numbers in waves(name, cycles, step=step):
+        yield f"{label}, moving", coefficients, numbers | {"drift": further}
 
 
 def both_sides(name: str) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -57,8 +57,8 @@ CYCLES = {
     ("dissipative", "time"): 40.0,
     ("dissipative", "since_reversal"): 8.0,
 }
-#: In time nothing need be a sine: what is switched is not.
-OVERTONES = {"time": (0, 2)}
+#: In time nothing need be a sine: what is switched is not; nor over angles, of tows that snap.
+OVERTONES = {"time": (0, 2), "angle": (0, 2)}
 
 
 def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> list[Effect]:
