@@ -29,6 +29,7 @@ __all__ = [
     "over_runs",
     "places",
     "splines",
+    "two_places",
     "wave",
 ]
 
@@ -38,6 +39,8 @@ SPLINES = (1, 2)
 STEPS, BUMPS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 #: How wide they are.
 WIDTH, BUMP_WIDTHS = 0.03, (0.03, 0.1)
+#: How far apart two such are.
+APART = (0.15, 0.3, 0.5)
 #: Decays from the clamp or from the free end, as shares of it.
 DECAYS = (0.05, 0.2)
 #: Different overhangs from which on what goes by them may bend, or change at one of them, and runs
@@ -119,16 +122,40 @@ def places(name: str, sharpest: float = 0.01) -> Iterator[Drawn]:
     )
 
 
-def wave(name: str) -> Drawn:
-    """A wave with a zero of its own."""
-    zero, sine, cosine = (coefficient(f"{name}_{of}") for of in ("0", "sine", "cosine"))
+def wave(name: str, overtones: int = 0, *, constant: bool = True) -> Drawn:
+    """A wave with a zero of its own, and overtones, of what is folded or laid in turns."""
+    zero = (coefficient(f"{name}_0"),) if constant else ()
+    own = tuple(
+        coefficient(f"{name}_{of}{k + 1 if k else ''}")
+        for k in range(overtones + 1)
+        for of in ("sine", "cosine")
+    )
     periods = tuple((1.0 / np.arange(WAVES, 0.9, -STEP)).tolist())
     period = Parameter(f"{name}_period", periods, 0.5 / WAVES, 2.0)
 
     def around(p: Values, x: Any) -> Any:
-        return p[zero.name] + _shape("periodic", p, (sine, cosine), None, p[period.name], x)
+        level = sum(p[c.name] for c in zero)
+        return level + _shape("periodic", p, own, None, p[period.name], x)
 
-    return "periodic", (zero, sine, cosine, period), around
+    label = "periodic" + (f", {overtones} overtones" if overtones else "")
+    return label, (*zero, *own, period), around
+
+
+def two_places(name: str) -> Drawn:
+    """What is at two places alike."""
+    one = coefficient(f"{name}_1")
+    first = Parameter(f"{name}_place", BUMPS[:-1], 0.0, 1.0)
+    apart = Parameter(f"{name}_apart", APART, 0.02, 1.0)
+    wide = Parameter(f"{name}_width", BUMP_WIDTHS[:1], 0.02, 0.2)
+
+    def both(p: Values, x: Any) -> Any:
+        at = (
+            (x - p[first.name]) / p[wide.name],
+            (x - p[first.name] - p[apart.name]) / p[wide.name],
+        )
+        return p[one.name] * sum(exp(-(y**2)) for y in at)
+
+    return "two bumps", (one, first, apart, wide), both
 
 
 def coefficient(name: str) -> Parameter:

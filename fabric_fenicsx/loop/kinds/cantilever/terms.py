@@ -41,6 +41,7 @@ from .shapes import (
     over_runs,
     places,
     splines,
+    two_places,
     wave,
 )
 from .term import (
@@ -69,6 +70,8 @@ BEYOND = 1.1
 PER_C1 = "stiffness_per_C1"
 #: Points of a bending moment as a table.
 TABULATED = 25
+#: Of rest curvatures, as of what was folded.
+OVERTONES = 2
 ENDS = {"clamp": ("arc_length",), "free end": ("arc_length", "length")}
 """Where places are counted from, and what they are made of."""
 
@@ -189,7 +192,9 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
             name = f"{acts_on}_of_{'_and_'.join(depends_on)}"
             most = LARGEST if constant else HEAVIEST
             drawn = [*along_the_strip(name, end, constant=constant, most=most)]
-            drawn += [wave(name)] if constant and end == "clamp" else []
+            if end == "clamp":
+                drawn += [two_places(name), wave(name, constant=constant)]
+                drawn += [wave(name, OVERTONES)] if constant else []
             forms = [
                 strip_form(
                     _from(label, end),
@@ -296,6 +301,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     by_z = radial[1].name
     shape = Shape("from_the_clamp_mm", "share_of_height", longest, lambda p, x: p[by_z] * x**2)
     forms = [StripVariant("radial", radial, shape=shape, camera=camera)]
+    forms += _lenses(name, width, depth, longest)
     about = "scale of the picture by the distance from the clamp in it"
     yield strip_effect(name, about, "reading", ("height", "distance"), forms)
 
@@ -365,6 +371,37 @@ def _larger(g: Of, by: str, most: float, p: Values, at: Values) -> tuple[Any, An
 def _radial(names: tuple[str, str], longest: float, p: Values, at: Values) -> tuple[Any, Any]:
     square = (at["x"] ** 2 + at["z"] ** 2) / longest**2
     return p[names[0]] * at["x"] * square, p[names[1]] * at["z"] * square
+
+
+def _lenses(name: str, width: float, depth: float, longest: float) -> Iterator[StripVariant]:
+    """Pictures by a lens that draws larger or smaller by the distance from its middle."""
+    x = Parameter(f"{name}_middle_x_mm", (0.0, width / 2.0), -2.0 * width, 2.0 * width)
+    z = Parameter(f"{name}_middle_z_mm", (0.0, -depth / 2.0), -2.0 * depth, 2.0 * depth)
+    for label, count in (("lens", 1), ("lens, bent back", 2)):
+        own = tuple(Parameter(f"{name}_{2 * k + 2}", amplitude=True) for k in range(count))
+        larger = partial(_magnified, tuple(c.name for c in own))
+        value = partial(_by_distance, larger)
+        shape = Shape("from_the_middle_mm", "share_of_picture", longest, value)
+        camera = partial(_through_a_lens, larger, (x.name, z.name), longest)
+        yield StripVariant(label, (*own, x, z), shape=shape, camera=camera)
+
+
+def _magnified(powers: tuple[str, ...], p: Values, square: Any) -> Any:
+    """a₂ r² + a₄ r⁴ (D. C. Brown, Photogramm. Eng. 37, 1971), r as a share of the longest strip."""
+    return sum(p[a] * square ** (k + 1) for k, a in enumerate(powers))
+
+
+def _by_distance(of: Of, p: Values, r: Any) -> Any:
+    return of(p, r**2)
+
+
+def _through_a_lens(
+    of: Of, middle: tuple[str, str], longest: float, p: Values, at: Values
+) -> tuple[Any, Any]:
+    """Places in a picture that a lens makes larger or smaller about its middle."""
+    x, z = at["x"] - p[middle[0]], at["z"] - p[middle[1]]
+    larger = of(p, (x**2 + z**2) / longest**2)
+    return larger * x, larger * z
 
 
 def _from(label: str, end: str) -> str:
