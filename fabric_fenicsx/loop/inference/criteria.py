@@ -39,6 +39,8 @@ class Criteria:
         decisive: −2 log likelihood, penalised, by which a model of more effects must win, and by
             which a rival may lose, or held-out runs be less likely; convention (Kass & Raftery,
             J. Am. Stat. Assoc. 90, 1995: very strong evidence).
+        strong: ... by which it must where the other one needs specimens that differ by more than
+            twice what is usual; convention (likewise: strong evidence).
         significant: standard errors that an amplitude must be from nothing, times what is expected
             that a held-out error may be, times what the baseline expects of it that a model may,
             and times what was stated that noise may be; convention.
@@ -101,6 +103,7 @@ class Criteria:
     hopeless_p: float = 1e-8
     other_form: float = 0.06
     decisive: float = 10.0
+    strong: float = 6.0
     significant: float = 2.0
     near: float = 1.15
     roughly: float = 1.4

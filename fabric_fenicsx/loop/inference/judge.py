@@ -294,10 +294,19 @@ class Judge:
 
         It may go by something that specimens differ in.
         """
-        usual = CRITERIA.significant * CRITERIA.usual_scatter
         groups = groups_of(self.experiment, model.variants)
-        own = set(groups) - {p.name for p in self.experiment.baseline}
-        return any(model.variances.scatter.get(group, 0.0) > usual for group in own)
+        return self._unusual(model, set(groups) - {p.name for p in self.experiment.baseline})
+
+    def unlike(self, model: Fit) -> bool:
+        """Whether specimens are unusually different in what the baseline has.
+
+        Where each was tested in a way of its own that may be an effect, and is as much of a claim.
+        """
+        return self._unusual(model, {p.name for p in self.experiment.baseline})
+
+    def _unusual(self, model: Fit, groups: Iterable[str]) -> bool:
+        usual = CRITERIA.significant * CRITERIA.usual_scatter
+        return any(model.variances.scatter.get(group, 0.0) > usual for group in groups)
 
     def foretells(self, model: Model, *, roughly: bool = False) -> bool:
         """Whether a model predicts what was left out, as well as its parameters are known."""

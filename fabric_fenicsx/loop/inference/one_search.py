@@ -240,13 +240,15 @@ class Search:
     def _settled(self, model: Model, baseline: Model) -> bool:
         """Whether nothing more is looked for.
 
-        Of terms only where their noise is not in doubt. And where specimens differ, each of which
-        was tested in a way of its own, what they differ by may be a further effect.
+        Of terms only where their noise is not in doubt. And where specimens differ unusually, or
+        each was tested in a way of its own, what they differ by may be a further effect.
         """
         if not self.judge.settled(model, baseline):
             return False
         if self._screened_first:
             return not self.judge.doubtful_noise(model)
+        if model.effects and self.judge.unlike(model.fit):
+            return False
         differ = self.experiment.each_its_own_way and bool(model.effects and model.fit.deviations)
         return not differ or self.judge.enough(model, baseline)
 
@@ -408,9 +410,12 @@ class Search:
             return levels[0][0]
         for count, level in enumerate(levels):
             more = [m.criterion for other in levels[count + 1 :] for m in other]
-            beaten = min(more, default=float("inf")) < level[0].criterion - CRITERIA.decisive
+            # Specimens that differ unusually are no simpler than an effect.
+            unlike = not self._screened_first and self.judge.unlike(level[0].fit)
+            by = CRITERIA.strong if unlike else CRITERIA.decisive
+            beaten = min(more, default=float("inf")) < level[0].criterion - by
             # What is left may be due to the form of an effect rather than to another one.
-            doubtful = self._screened_first and self.judge.doubtful_noise(level[0])
+            doubtful = unlike or (self._screened_first and self.judge.doubtful_noise(level[0]))
             enough = count and not doubtful and self.judge.enough(level[0], levels[0][0])
             if beaten and not enough:
                 continue
