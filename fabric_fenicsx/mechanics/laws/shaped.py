@@ -43,6 +43,9 @@ Kind = Literal[
     "peak",
     "pulse",
     "window",
+    "corner",
+    "two bumps",
+    "ringing",
 ]
 Base = Literal[
     "elastic",
@@ -181,7 +184,9 @@ def shape_of(
             c₁ sin(2πx/w) + c₂ (cos(2πx/w) − 1), and overtones;
             "bump", (c₁ + c₂ y) e^(−y²) with y = (x − x₀)/w, less what that is at 0; "peak",
             c e^(−y²) with y = ln(x/x₀)/w; "pulse", c e^(−(x − x₀)/w) from x₀ on, where it begins
-            within ONSET; "window", a step at x₀ and the same step back a span later;
+            within ONSET; "window", a step at x₀ and the same step back a span later; "corner",
+            c w ln(1 + exp((x − x₀)/w)), which bends at x₀; "two bumps", c₁ e^(−y²) and c₂ times
+            the same a span further; "ringing", a wave that dies away, by e^(−x/span);
             "sign", c tanh(x/w); "sides", c₁ x + c₂ |x|, each side of 0 with a slope of its own;
             "saturating sides", c₁ f(x) for x > 0 and c₂ f(−x) for x < 0 with f of a saturation, and
             "power sides" with |x|^w.
@@ -190,7 +195,7 @@ def shape_of(
         place: x₀ of a step or a bump.
         width: w.
         ends: between which the pieces of a spline lie.
-        span: of a window.
+        span: of a window, between two bumps, or in which a ringing dies away.
     """
     c = coefficients
     if not len(c):
@@ -213,6 +218,15 @@ def shape_of(
         return _bump(c, (x - place) / width) - _bump(c, -place / width)
     if kind == "peak":
         return c[0] * exp(-((ln(max_value(x, LEAST) / place) / width) ** 2))
+    if kind == "two bumps":
+        places = (place, place + span)
+        at = [(_bump((1, 0), (x - p) / width) - _bump((1, 0), -p / width)) for p in places]
+        return c[0] * at[0] + c[1] * at[1]
+    if kind == "corner":
+        return c[0] * (_corner(x - place, width) - _corner(-place, width))
+    if kind == "ringing":
+        turn, left = 2 * pi * x / width, exp(-x / span)
+        return left * (c[0] * sin(turn) + c[1] * cos(turn)) - c[1]
     if kind == "pulse":
         past = x - place
         return c[0] * exp(-max_value(past, 0) / width) * (1 + tanh(past / ONSET)) / 2
@@ -235,6 +249,11 @@ def shape_of(
 def _step(x: Any, place: Any, width: Any) -> Any:
     """From 0 at 0 to about 1 beyond the place."""
     return 1 / (1 + exp(-(x - place) / width)) - 1 / (1 + exp(place / width))
+
+
+def _corner(x: Any, width: Any) -> Any:
+    """0 before a corner and x beyond it: w ln(1 + e^(x/w)), which no x is too large for."""
+    return max_value(x, 0) + width * ln(1 + exp(-size_of(x) / width))
 
 
 def _saturation(x: Any, width: Any) -> Any:
@@ -331,7 +350,7 @@ class ShapedLaw(CrossingLaw):
     shape: Kind = number("shape", "of the factor", Kind, "spline")
     place: Any = number("place", "of a step, as a share of the reach", float, 0.5)
     width: Any = number("width", "of a step, saturation or wave, as a share of it", Positive, 0.1)
-    span: Any = number("span", "of a window, as a share of it", Positive, 0.3)
+    span: Any = number("span", "of a window or a ringing, as a share of it", Positive, 0.3)
     k1: Any = per_area("k1_N_mm", "linear part of the elastic base", NotNegative, 0.0)
     k3: Any = per_area("k3_N_mm", "cubic part of the elastic base", NotNegative, 0.0)
     stick_angle: Any = in_degrees("stick_angle_deg", "of a friction", default=0.5)

@@ -25,7 +25,9 @@ from .shapes import (
     memory_of,
     over,
     pulses,
+    ringing,
     shapes,
+    two_bumps,
     waves,
     wealth,
     windows,
@@ -360,6 +362,7 @@ def _courses(name: str, variable: str) -> Iterator[Drawn]:
         yield from waves(name, SWITCHED, OVERTONES)
         yield from pulses(name)
         yield from windows(name)
+        yield from ringing(name, CYCLES[variable])
 
 
 def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
@@ -413,7 +416,7 @@ def _added(
         yield label, numbers | {"coefficients": coefficients} | constant
     goes_on = variable in CYCLES and not turning
     if goes_on or (variable, turning) == ("displacement", "over a way"):
-        for label, coefficients, numbers in bumps(name, between):
+        for label, coefficients, numbers in (*bumps(name, between), *two_bumps(name, between)):
             yield label, numbers | {"coefficients": coefficients} | constant
     if goes_on:
         # Where a run begins a wave may be anywhere.

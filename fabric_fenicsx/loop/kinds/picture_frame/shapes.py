@@ -33,7 +33,9 @@ __all__ = [
     "product",
     "pulses",
     "remembered_since",
+    "ringing",
     "shapes",
+    "two_bumps",
     "waves",
     "wealth",
     "windows",
@@ -55,9 +57,10 @@ PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
 #: Likewise of a bump.
 BUMPS, BUMP_WIDTHS = tuple((0.05 + 0.1 * np.arange(10)).tolist()), (0.03, 0.12)
 #: Decays, as shares of the range.
-DECAYS = (0.1, 0.3)
+DECAYS = (0.01, 0.1, 0.3)
 #: Where a logarithm bends over, or a hyperbola is half of what it ends at, as shares of it.
-BENDS = (0.01, 0.1)
+#: ... and where at least: squares of slow and fast runs are far apart.
+BENDS, LEAST = (0.001, 0.01, 0.1), 1e-5
 #: Likewise of what rises and falls again, whose width is that of a logarithm.
 TOPS, TOP_WIDTHS = (0.05, 0.15, 0.4, 0.7), (0.5,)
 #: Likewise of what is there for a while, how long that is, and how soon it begins and ends.
@@ -67,6 +70,8 @@ EDGES = (0.02,)
 #: are alike a period further, more of these.
 STOPS, STOP_WIDTHS, DRIFTS = (0.1, 0.3, 0.5, 0.7, 0.9), (0.1,), (-0.4, -0.12, 0.12, 0.4)
 WAVE_DRIFTS = (-0.6, -0.3, -0.15, -0.07, 0.07, 0.15, 0.3, 0.6)
+#: How sharp a corner is.
+SHARPS = (0.02,)
 #: Decays of what begins somewhere.
 FADING = (0.05, 0.2)
 #: Steps of how many cycles a wave is looked for with: closer together two are alike.
@@ -226,18 +231,20 @@ def shapes(name: str, wealth: int) -> Iterator[Drawn]:
         place = Parameter(f"{name}_place", PLACES, 0.0, 1.0)
         width = Parameter(f"{name}_width", WIDTHS, 0.002, 0.5)
         yield "step", one, {"shape": "step", "place": place, "width": width}
-        decay = Parameter(f"{name}_decay", DECAYS, 0.01, 2.0)
+        decay = Parameter(f"{name}_decay", DECAYS, 1e-3, 2.0)
         yield "saturation", one, {"shape": "saturation", "width": decay}
     if wealth >= 4:
         own = tuple(Parameter(f"{name}_{k + 1}", amplitude=True) for k in range(len(GRADED) + 2))
         yield "graded", own, {"shape": "graded"}
-        bend = Parameter(f"{name}_bend", BENDS, 1e-3, 1.0)
+        bend = Parameter(f"{name}_bend", BENDS, LEAST, 1.0)
         yield "logarithm", one, {"shape": "logarithm", "width": bend}
-        half = Parameter(f"{name}_half", BENDS, 1e-3, 1.0)
+        half = Parameter(f"{name}_half", BENDS, LEAST, 1.0)
         yield "hyperbola", one, {"shape": "hyperbola", "width": half}
         top = Parameter(f"{name}_top", TOPS, 0.01, 1.0)
         wide = Parameter(f"{name}_wide", TOP_WIDTHS, 0.2, 2.0)
         yield "peak", one, {"shape": "peak", "place": top, "width": wide}
+        sharp = Parameter(f"{name}_width", SHARPS, 0.002, 0.3)
+        yield "corner", one, {"shape": "corner", "place": place, "width": sharp}
 
 
 def waves(
@@ -269,6 +276,27 @@ def bumps(name: str, ends: tuple[float, float] = (0.0, 1.0)) -> Iterator[Drawn]:
     place = Parameter(f"{name}_place", places, low, high)
     width = Parameter(f"{name}_width", BUMP_WIDTHS, 0.005, 0.5)
     yield "bump", own, {"shape": "bump", "place": place, "width": width}
+
+
+def two_bumps(name: str, ends: tuple[float, float] = (0.0, 1.0)) -> Iterator[Drawn]:
+    """What is at two places, more or less: as shapes; see ``bumps``."""
+    own = tuple(Parameter(f"{name}_{of}", amplitude=True) for of in ("first", "second"))
+    low, high = ends
+    place = Parameter(
+        f"{name}_place", tuple(low + (high - low) * share for share in STOPS[:-1]), low, high
+    )
+    apart = Parameter(f"{name}_apart", SPANS[1:], 0.02, high - low)
+    width = Parameter(f"{name}_width", STOP_WIDTHS, 0.005, 0.5)
+    yield "two bumps", own, {"shape": "two bumps", "place": place, "span": apart, "width": width}
+
+
+def ringing(name: str, most: float) -> Iterator[Drawn]:
+    """A wave that dies away, with at most so many cycles over the range: as shapes."""
+    own = tuple(Parameter(f"{name}_{of}", amplitude=True) for of in ("sine", "cosine"))
+    periods = tuple((1.0 / np.arange(most, 1.0, -2.0 * STEP)).tolist())
+    period = Parameter(f"{name}_period", periods, 0.5 / most, 2.0)
+    fading = Parameter(f"{name}_fading", FADING, 0.01, 3.0)
+    yield "ringing", own, {"shape": "ringing", "width": period, "span": fading}
 
 
 def pulses(name: str) -> Iterator[Drawn]:

@@ -32,6 +32,7 @@ from .shapes import (
     pulses,
     remembered_since,
     shapes,
+    two_bumps,
     waves,
     wealth,
     windows,
@@ -272,7 +273,7 @@ def _laws(
     also = f", {base}" if base in ("smooth", "forward") else ""
     drawn = [*shapes(name, wealth(base, variable))]
     if (base, variable) in FINE or variable == "time":
-        drawn += bumps(name)
+        drawn += [*bumps(name), *two_bumps(name)]
     if variable == "time":
         drawn += [*pulses(name), *windows(name)]
     if (base, variable) in CYCLES:
