@@ -40,6 +40,8 @@ BEST_PAIRS, FORMS = 12, 3
 MOST_SHAPES, MOST_PAIRS = 60, 60
 #: Columns of which all products are taken at once, and otherwise sets that share their products.
 MOST_COLUMNS, SETS = 4000, 300
+#: Groups of sets that are about as wide.
+WIDTHS = 4
 #: Times that amplitudes of the wrong sign are taken out.
 SIGNS = 3
 
@@ -238,15 +240,20 @@ class Screen:
         """What each set takes off the sum of squares, amplitudes of the wrong sign left out."""
         if not sets:
             return np.zeros(0)
-        width = max(sum(len(g.places) for g in one) for one in sets)
-        places = np.full((len(sets), width), -1)
+        widths = np.array([sum(len(g.places) for g in one) for one in sets])
+        places = np.full((len(sets), widths.max()), -1)
         for k, one in enumerate(sets):
-            own = [place for g in one for place in g.places]
-            places[k, : len(own)] = own
+            places[k, : widths[k]] = [place for g in one for place in g.places]
         # The Gram matrix of all shapes would be larger than all else in memory.
         few = self._columns_of(places).sum() <= MOST_COLUMNS
-        parts = [places] if few else np.array_split(places, 1 + len(places) // SETS)
-        return np.concatenate([self._solved_in(part) for part in parts])
+        parts = 1 if few else 1 + len(places) // SETS
+        gains = np.zeros(len(sets))
+        for part in np.array_split(np.arange(len(sets)), parts):
+            # Of as many columns as the widest of some that are about as wide.
+            for own in np.array_split(part[np.argsort(widths[part])], WIDTHS):
+                if len(own):
+                    gains[own] = self._solved_in(places[own, : widths[own].max()])
+        return gains
 
     def _solved_in(self, places: Places) -> Array:
         """The same from places of columns, (n_sets, width), -1 for none."""

@@ -100,11 +100,13 @@ def over_overhangs(name: str, count: float, *, constant: bool = False) -> Iterat
             return lambda p, x: sum(p[c.name] for c in zero) + place(p, x)
 
         for label, own, place in places(name):
-            yield label, (*zero, *own), from_zero(place)
+            # Few overhangs tell no corner from a step.
+            if label != "corner":
+                yield label, (*zero, *own), from_zero(place)
 
 
 def places(name: str, sharpest: float = 0.01) -> Iterator[Drawn]:
-    """What is from one place on, no sharper than that share of the range, or at one alone."""
+    """What is or grows from a place on, no sharper than that share of the range, or is at one."""
     one = coefficient(f"{name}_1")
     place = Parameter(f"{name}_place", STEPS, 0.0, 1.0)
     width = Parameter(f"{name}_width", (WIDTH,), sharpest, 0.3)
@@ -112,6 +114,11 @@ def places(name: str, sharpest: float = 0.01) -> Iterator[Drawn]:
         "step",
         (one, place, width),
         lambda p, x: _shape("step", p, (one,), p[place.name], p[width.name], x),
+    )
+    yield (
+        "corner",
+        (one, place, width),
+        lambda p, x: _shape("corner", p, (one,), p[place.name], p[width.name], x),
     )
     about = Parameter(f"{name}_place", BUMPS, 0.0, 1.0)
     wide = Parameter(f"{name}_width", BUMP_WIDTHS, 0.02, 0.4)

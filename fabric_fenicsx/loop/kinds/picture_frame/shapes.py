@@ -41,9 +41,9 @@ __all__ = [
     "windows",
 ]
 
-#: Numbers of coefficients of a spline; the last one of what a place may have to itself.
-SPLINES = (1, 2, 3, 5, 9)
-#: What has that one.
+#: Numbers of coefficients of a spline; the last ones of what a place may have to itself.
+SPLINES = (1, 2, 3, 5, 9, 17)
+#: What has those.
 FINE = (
     ("odd", "angle"),
     ("even", "angle"),
@@ -51,6 +51,7 @@ FINE = (
     ("smooth", "angle"),
     ("reading", "displacement"),
     ("reading", "force"),
+    *((base, "time") for base in ("elastic", "viscous", "dissipative", "smooth", "reading")),
 )
 #: Where a step may begin to be looked for, as a share of the range, and how wide it is.
 PLACES, WIDTHS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9), (0.05,)
@@ -212,7 +213,7 @@ def wealth(base: str, variable: str) -> int:
         # Small ones and large ones are far apart.
         return 4
     if (base, variable) in FINE:
-        return 5
+        return 6
     return 3 if variable in (*FORGETFUL, "recent_force", "mean_speed") else 4
 
 

@@ -57,6 +57,7 @@ CYCLES = {
     ("viscous", "time"): 40.0,
     ("dissipative", "time"): 40.0,
     ("dissipative", "since_reversal"): 8.0,
+    ("dissipative", "angle"): 8.0,
 }
 #: In time nothing need be a sine: what is switched is not; nor over angles, of tows that snap.
 OVERTONES = {"time": (0, 2), "angle": (0, 2)}
