@@ -28,7 +28,7 @@ class Lagging(CrossingLaw):
         coefficients: of f [N mm].
         reach: p_max [rad], or that of the rate [rad/s].
         shape: one of those of ``shape_of`` that Kind names.
-        place, width: its x₀ and w, as shares of p_max.
+        place, width: its x₀ and w, as shares of p_max; a span is 0.3 of it.
         even: g is f(|p|/p_max), a moment to one side.
         memory: τ₀ [s]; None of what never forgets.
         growth: a [-]; None is none.
