@@ -6,6 +6,7 @@ the other, the run or the overhang, there is a shape g as of terms over one vari
     (x, z) + g (−z, x),  z + x g,  z (1 + g)    what the camera sees
     κ0 = s g,  w (1 + s g),  M = B κ e^(−s g)   what acts on the strip, or with e^(−s/r) for s
     M = B κ e^(−g |κ|/(|κ| + κ₁))               a law that changes from run to run
+    M = B κ e^(−s g(|κ|/(|κ| + κ₁)))            or along the strip
 
 What acts on the strip is for where no term over one variable will do. What the camera does is
 looked at with these: a zero of each run, which has as many numbers as there are runs, may otherwise
@@ -42,6 +43,8 @@ __all__ = ["products"]
 
 #: Where r is looked for, as shares of the longest strip.
 REACHES = (0.1, 0.3)
+#: Where something begins, likewise, and within how much.
+BEGINS, EDGE = (0.15, 0.3, 0.5), 0.01
 Share = Callable[[Values, Values], Any]
 """How much of a term there is in a place of a strip."""
 
@@ -56,6 +59,7 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
         ranges: see ``terms``; without two "runs" before one there are none by the run.
     """
     yield from _turned_by("length", ranges["length"], partial(splines, counts=SPLINES))
+    yield _law_along_the_strip(ranges["length"], ranges["curvature"])
     last = ranges.get("runs", 0.0)
     if last < FEWEST_BEFORE:
         return
@@ -106,11 +110,46 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
     yield strip_effect(name, about, "bending_moment", ("curvature", "run"), forms, of_two=True)
 
 
+def _law_along_the_strip(longest: float, bend: float) -> Effect:
+    name = "bending_moment_of_arc_length_and_curvature"
+    half = half_way(name, bend)
+
+    def at_most(where: Share, g: Of, p: Values, x: Any) -> Any:
+        return where(p, {"s": x * longest}) * g(p, bend / (bend + p[half.name]))
+
+    forms = [
+        strip_form(
+            label + words,
+            (*parameters, half, *more),
+            # Of what is bent the most.
+            Shape(X["clamp"], Y["bending_moment"], longest, partial(at_most, where, g)),
+            "bending_moment",
+            partial(_bent_there, g, half.name, where),
+        )
+        for words, more, where in (*_places(name, longest), _from_a_place(name, longest))
+        for label, parameters, g in splines(name, SPLINES)
+    ]
+    about = "a law of the curvature that changes along the strip"
+    depends_on = ("arc_length", "curvature")
+    return strip_effect(name, about, "bending_moment", depends_on, forms, of_two=True)
+
+
+def _bent_there(g: Of, half: str, share: Share, p: Values, at: Values) -> Any:
+    return share(p, at) * g(p, bent(half, p, at))
+
+
 def _places(name: str, longest: float) -> Iterator[tuple[str, tuple[Parameter, ...], Share]]:
     """How much of it there is at an arc length: in words, its own numbers, and the share."""
     yield "", (), lambda p, at: at["s"] / longest
     reach = Parameter(f"{name}_reach_mm", tuple(share * longest for share in REACHES), 1.0, longest)
     yield ", at the clamp", (reach,), lambda p, at: exp(-at["s"] / p[reach.name])
+
+
+def _from_a_place(name: str, longest: float) -> tuple[str, tuple[Parameter, ...], Share]:
+    """Likewise, of what begins somewhere."""
+    place = Parameter(f"{name}_place_mm", tuple(b * longest for b in BEGINS), 0.0, longest)
+    edge = EDGE * longest
+    return ", from a place", (place,), lambda p, at: 1 / (1 + exp((p[place.name] - at["s"]) / edge))
 
 
 def _turned_by(
