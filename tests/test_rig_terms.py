@@ -539,6 +539,15 @@ def test_numbers_of_a_file_are_python_s():
         ("travel_of_displacement_and_force", "linear, powers 1"),
         ("reading_of_force_and_rate", "gain, linear"),
         ("travel_of_displacement_and_direction", "linear, over a way"),
+        ("dissipative_moment_of_time", "time, window"),
+        ("odd_moment_of_angle", "angle, two bumps"),
+        ("dissipative_moment_of_angle", "angle, corner"),
+        ("odd_moment_of_angle_and_path", "angle, bump that moves with the path"),
+        ("viscous_moment_of_angle_and_time", "angle, periodic, moving with the time"),
+        ("reading_of_time", "ringing"),
+        ("reading_of_time", "window"),
+        ("reading_of_displacement_and_time", "periodic, moving"),
+        ("travel_of_displacement_and_time", "step that moves"),
     ],
 )
 def test_the_file_is_the_term(tmp_path, name, label):
@@ -559,38 +568,3 @@ def test_the_file_is_the_term(tmp_path, name, label):
     assert np.abs(expected - without).max() > 2.0 * NOISE
     same, _ = experiment.predict((form,), BASE | {"discovered_1_amount": 1.0})
     assert same == pytest.approx(expected, abs=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("name", "label"),
-    [
-        ("dissipative_moment_of_time", "time, window"),
-        ("odd_moment_of_angle", "angle, two bumps"),
-        ("dissipative_moment_of_angle", "angle, corner"),
-        ("odd_moment_of_angle_and_path", "angle, bump that moves with the path"),
-        ("viscous_moment_of_angle_and_time", "angle, periodic, moving with the time"),
-        ("reading_of_time", "ringing"),
-        ("reading_of_time", "window"),
-        ("reading_of_displacement_and_time", "periodic, moving"),
-        ("travel_of_displacement_and_time", "step that moves"),
-    ],
-)
-def test_what_moves_or_passes_is_in_its_file_as_it_was_found(name, label, tmp_path):
-    """The same readings, which are others than without it."""
-    experiment = write(tmp_path / "set", abraded_spring, MORE)
-    effect = next(t for t in experiment.terms if t.name == name)
-    (variant,) = (v for v in effect.variants if v.label == label)
-    plain = {"k1_N": 0.02, "k3_N": 0.1, "c1_N_s": 0.1}
-    size = 5.0 if name.startswith(("reading", "travel")) else 0.02
-    own = {p.name: size if p.amplitude else p.starts[-1] for p in variant.parameters}
-    term = Discovered("discovered_1", effect, variant, plain | own, pd.DataFrame(), "formula")
-    (tmp_path / "discovered_1.py").write_text(effect_file(term, "made up"))
-    again = PictureFrame(
-        [read_measurement(tmp_path / "set")], read_effects(tmp_path / "discovered_1.py")
-    )
-    (found,) = (e for e in again.effects if e.name == "discovered_1")
-    expected, _ = experiment.predict((variant,), plain | own)
-    same, _ = again.predict(found.variants, plain | {"discovered_1_amount": 1.0})
-    without, _ = experiment.predict((), plain)
-    assert same == pytest.approx(expected, abs=1e-9)
-    assert np.abs(expected - without).max() > 0.03
