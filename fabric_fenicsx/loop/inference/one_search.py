@@ -11,13 +11,14 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from ...errors import SolveError
 from ..kept import Kept
+from .choice import chosen_model, in_place_of, models_instead, verdict_on
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
-from .diagnosis import Candidate, Diagnosis, Verdict
+from .diagnosis import Candidate, Diagnosis
 from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitting import Fit, fit
@@ -83,8 +84,8 @@ class Search:
             levels = self._with_other_readings(candidates, levels)
         baseline = levels[0][0]
         self.singles = levels[1] if len(levels) > 1 else ()
-        chosen = self._chosen(levels)
-        verdict = self._verdict(baseline, chosen)
+        chosen = chosen_model(self.judge, levels, terms=self._screened_first)
+        verdict = verdict_on(self.judge, baseline, chosen)
         self.accounted = self.judge.accounts(chosen, baseline)
         self.effects_needed = len(chosen.effects)
         self.doubtful_noise = self.judge.doubtful_noise(chosen)
@@ -98,7 +99,7 @@ class Search:
         misfit = self.judge.misfit(judged)
         curve = self._curve(judged) if verdict == "unexplained" else None
         of_the_curve = self._of_the_curve(levels) if curve is not None else ()
-        instead = self._instead(levels, chosen) if verdict == "unexplained" else {}
+        instead = models_instead(self.judge, levels, chosen) if verdict == "unexplained" else {}
         most = CRITERIA.terms if self._screened_first else len(self.effects)
         rivals = rivals_of(self.models, self._screened, final, levels, most, self._tried)
         for candidate in candidates:
@@ -122,7 +123,7 @@ class Search:
             rivals=rivals,
             pairs=[
                 *pairs_of(self.models, final, rivals, of_the_curve),
-                *pairs_of(self.models, chosen, _in_place_of(chosen, instead), ()),
+                *pairs_of(self.models, chosen, in_place_of(chosen, instead), ()),
             ],
             candidates=candidates,
             holdout_before=self.judge.holdout(baseline.fit),
@@ -401,73 +402,6 @@ class Search:
         if found:
             levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
 
-    # Choice -------------------------------------------------------------------------------
-
-    def _chosen(self, levels: Sequence[Sequence[Model]]) -> Model:
-        """The model of fewest effects that no other beats decisively, if it bears scrutiny."""
-        if self.experiment.curves_only and self.judge.settled(levels[0][0], levels[0][0]):
-            # Another curve would be no finding, and its lead turns with the last digits read.
-            return levels[0][0]
-        for count, level in enumerate(levels):
-            more = [m.criterion for other in levels[count + 1 :] for m in other]
-            # Specimens that differ unusually are no simpler than an effect.
-            unlike = not self._screened_first and self.judge.unlike(level[0].fit)
-            by = CRITERIA.strong if unlike else CRITERIA.decisive
-            beaten = min(more, default=float("inf")) < level[0].criterion - by
-            # What is left may be due to the form of an effect rather than to another one.
-            doubtful = unlike or (self._screened_first and self.judge.doubtful_noise(level[0]))
-            enough = count and not doubtful and self.judge.enough(level[0], levels[0][0])
-            if beaten and not enough:
-                continue
-            while count:
-                found = self._bearing_scrutiny(levels[count], levels[count - 1])
-                if found is not None:
-                    return found
-                count -= 1
-            return levels[0][0]
-        return levels[-1][0]
-
-    def _bearing_scrutiny(self, level: Sequence[Model], fewer: Sequence[Model]) -> Model | None:
-        """The best model of a level in the best of its forms that can be claimed; None without."""
-        best = level[0]
-        for model in level:
-            near = model.criterion < best.criterion + CRITERIA.decisive
-            if near and set(model.effects) == set(best.effects):
-                if self.judge.significant(model, fewer) and self.judge.improves(model, fewer[0]):
-                    return model
-        return None
-
-    def _verdict(self, baseline: Model, chosen: Model) -> Verdict:
-        if not chosen.effects:
-            return "no_effect" if self.judge.explains(baseline, baseline) else "unexplained"
-        if self.experiment.curves_only:
-            # Every effect can be such curves: none is told from the others.
-            return "unexplained"
-        listed = all(e.listed for e in chosen.effects)
-        if not self.judge.explains(chosen, baseline, roughly=not listed):
-            return "unexplained"
-        return "effect_found" if listed else "effect_discovered"
-
-    def _instead(
-        self, levels: Sequence[Sequence[Model]], chosen: Model
-    ) -> dict[frozenset[Effect], Fit]:
-        """By their effects, models as near as the chosen one that explain what it does not.
-
-        It accounts for the fitted readings, which do not tell them from it, and holdout runs, which
-        contradict it alone, choose nothing.
-        """
-        baseline, own = levels[0][0], frozenset(chosen.effects)
-        found: dict[frozenset[Effect], Fit] = {}
-        if not own or self.experiment.curves_only or not self.judge.accounts(chosen, baseline):
-            return found
-        for model in levels[len(own)]:
-            effects = frozenset(model.effects)
-            near = model.criterion < chosen.criterion + CRITERIA.decisive
-            if near and effects != own and effects not in found and self.judge.significant(model):
-                if self.judge.explains(model, baseline):
-                    found[effects] = model.fit
-        return found
-
     def _curve(self, model: Model) -> Curve | None:
         known = self.experiment.one_curve
         if known is None:
@@ -485,16 +419,6 @@ class Search:
 def _by_itself(forms: Mapping[Variant, Sequence[Signature]]) -> list[Combination]:
     """Each shape of each form of an effect."""
     return [((variant, shape),) for variant, shapes in forms.items() for shape in shapes]
-
-
-def _in_place_of(chosen: Model, others: Iterable[frozenset[Effect]]) -> dict[str, list[str]]:
-    """By effect of a model, what others have in its place, where that is all they differ in."""
-    found: dict[str, list[str]] = {}
-    for effects in others:
-        own, its = set(chosen.effects) - effects, effects - set(chosen.effects)
-        if len(own) == len(its) == 1:
-            found.setdefault(own.pop().name, []).append(next(iter(its)).name)
-    return found
 
 
 def _best_of(effect: Effect, levels: Sequence[Sequence[Model]]) -> Fit | None:

@@ -1,0 +1,99 @@
+"""Which of the models that a search has fitted is chosen, and what is said of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from .criteria import CRITERIA
+from .diagnosis import Verdict
+from .effects import Effect
+from .fitting import Fit
+from .judge import Judge, Model
+
+__all__ = ["chosen_model", "in_place_of", "models_instead", "verdict_on"]
+
+
+def chosen_model(judge: Judge, levels: Sequence[Sequence[Model]], *, terms: bool) -> Model:
+    """The model of fewest effects that no other beats decisively, if it bears scrutiny.
+
+    Args:
+        judge: of all models.
+        levels: models by their number of effects, none of them empty, the best first.
+        terms: whether terms without a formula are among what was tried.
+    """
+    if judge.experiment.curves_only and judge.settled(levels[0][0], levels[0][0]):
+        # Another curve would be no finding, and its lead turns with the last digits read.
+        return levels[0][0]
+    for count, level in enumerate(levels):
+        more = [m.criterion for other in levels[count + 1 :] for m in other]
+        # Specimens that differ unusually are no simpler than an effect.
+        unlike = not terms and judge.unlike(level[0].fit)
+        by = CRITERIA.strong if unlike else CRITERIA.decisive
+        beaten = min(more, default=float("inf")) < level[0].criterion - by
+        # What is left may be due to the form of an effect rather than to another one.
+        doubtful = unlike or (terms and judge.doubtful_noise(level[0]))
+        enough = count and not doubtful and judge.enough(level[0], levels[0][0])
+        if beaten and not enough:
+            continue
+        while count:
+            found = _bearing_scrutiny(judge, levels[count], levels[count - 1])
+            if found is not None:
+                return found
+            count -= 1
+        return levels[0][0]
+    return levels[-1][0]
+
+
+def _bearing_scrutiny(judge: Judge, level: Sequence[Model], fewer: Sequence[Model]) -> Model | None:
+    """The best model of a level in the best of its forms that can be claimed; None without."""
+    best = level[0]
+    for model in level:
+        near = model.criterion < best.criterion + CRITERIA.decisive
+        if near and set(model.effects) == set(best.effects):
+            if judge.significant(model, fewer) and judge.improves(model, fewer[0]):
+                return model
+    return None
+
+
+def verdict_on(judge: Judge, baseline: Model, chosen: Model) -> Verdict:
+    """What a report says first; see docs/diagnosis.md."""
+    if not chosen.effects:
+        return "no_effect" if judge.explains(baseline, baseline) else "unexplained"
+    if judge.experiment.curves_only:
+        # Every effect can be such curves: none is told from the others.
+        return "unexplained"
+    listed = all(e.listed for e in chosen.effects)
+    if not judge.explains(chosen, baseline, roughly=not listed):
+        return "unexplained"
+    return "effect_found" if listed else "effect_discovered"
+
+
+def models_instead(
+    judge: Judge, levels: Sequence[Sequence[Model]], chosen: Model
+) -> dict[frozenset[Effect], Fit]:
+    """By their effects, models as near as the chosen one that explain what it does not.
+
+    It accounts for the fitted readings, which do not tell them from it, and holdout runs, which
+    contradict it alone, choose nothing.
+    """
+    baseline, own = levels[0][0], frozenset(chosen.effects)
+    found: dict[frozenset[Effect], Fit] = {}
+    if not own or judge.experiment.curves_only or not judge.accounts(chosen, baseline):
+        return found
+    for model in levels[len(own)]:
+        effects = frozenset(model.effects)
+        near = model.criterion < chosen.criterion + CRITERIA.decisive
+        if near and effects != own and effects not in found and judge.significant(model):
+            if judge.explains(model, baseline):
+                found[effects] = model.fit
+    return found
+
+
+def in_place_of(chosen: Model, others: Iterable[frozenset[Effect]]) -> dict[str, list[str]]:
+    """By effect of a model, what others have in its place, where that is all they differ in."""
+    found: dict[str, list[str]] = {}
+    for effects in others:
+        own, its = set(chosen.effects) - effects, effects - set(chosen.effects)
+        if len(own) == len(its) == 1:
+            found.setdefault(own.pop().name, []).append(next(iter(its)).name)
+    return found
