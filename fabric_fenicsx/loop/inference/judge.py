@@ -383,8 +383,9 @@ class Judge:
                 size = model.fit.wald(own, [*known])
                 return bool(chi2.sf(size, len(own)) < 2.0 * norm.sf(CRITERIA.significant))
 
-            if effect.listed or beyond(p.name for p in variant.shapes):
-                return beyond(p.name for p in variant.shapes)
+            as_found = beyond(p.name for p in variant.shapes)
+            if effect.listed or as_found:
+                return as_found
             kept = set(model.effects) - {effect}
             without = [m.criterion for m in fewer if set(m.effects) == kept]
             needed = min(without, default=-np.inf) > model.criterion + CRITERIA.decisive

@@ -110,16 +110,12 @@ def places(name: str, sharpest: float = 0.01) -> Iterator[Drawn]:
     one = coefficient(f"{name}_1")
     place = Parameter(f"{name}_place", STEPS, 0.0, 1.0)
     width = Parameter(f"{name}_width", (WIDTH,), sharpest, 0.3)
-    yield (
-        "step",
-        (one, place, width),
-        lambda p, x: _shape("step", p, (one,), p[place.name], p[width.name], x),
-    )
-    yield (
-        "corner",
-        (one, place, width),
-        lambda p, x: _shape("corner", p, (one,), p[place.name], p[width.name], x),
-    )
+
+    def from_there(kind: str) -> Of:
+        return lambda p, x: _shape(kind, p, (one,), p[place.name], p[width.name], x)
+
+    for kind in ("step", "corner"):
+        yield kind, (one, place, width), from_there(kind)
     about = Parameter(f"{name}_place", BUMPS, 0.0, 1.0)
     wide = Parameter(f"{name}_width", BUMP_WIDTHS, 0.02, 0.4)
     yield (

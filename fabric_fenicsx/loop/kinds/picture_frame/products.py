@@ -140,27 +140,26 @@ def _forms(
 def _turned(
     kind: _Kind, name: str, history: str, largest: Mapping[str, float]
 ) -> Iterator[FrameVariant]:
-    """Forms in which a shape over the angle goes by powers of a history."""
-    for powers in kind.turned if history in HISTORIES else ():
-        fixed: dict[str, Any] = {"base": kind.base, "variable": kind.also, "also": history}
-        fixed |= {"reach": largest[kind.also], "also_reach": largest[history], "powers": powers}
-        fixed |= remembering(name, kind.base, kind.also, largest)
-        said = f"powers {', '.join(map(str, powers))} of {history.replace('_', ' ')}"
+    """Forms in which a shape over the angle goes by powers of a history, or moves with it."""
+    if not kind.turned or history not in HISTORIES:
+        return
+    fixed: dict[str, Any] = {"base": kind.base, "variable": kind.also, "also": history}
+    fixed |= {"reach": largest[kind.also], "also_reach": largest[history]}
+    fixed |= remembering(name, kind.base, kind.also, largest)
+    words = history.replace("_", " ")
+    for powers in kind.turned:
+        said = f"powers {', '.join(map(str, powers))} of {words}"
         for label, one, numbers in (*bumps(name), *shapes(name, 2)):
             coefficients = of_powers(name, powers, one)
             if label in AT_AN_ANGLE and coefficients is not None:
-                own = fixed | numbers | {"coefficients": coefficients}
+                own = fixed | numbers | {"powers": powers, "coefficients": coefficients}
                 yield _form(f"{kind.also}, {label}, {said}", own, "", None)
-    if kind.turned and history in HISTORIES:
-        own = {"base": kind.base, "variable": kind.also, "also": history, "powers": (0,)}
-        own |= {"reach": largest[kind.also], "also_reach": largest[history]}
-        own |= remembering(name, kind.base, kind.also, largest)
-        if kind.base != "viscous":
-            own["constants"] = (Parameter(f"{name}_0_0", amplitude=True),)
-        for label, one, numbers in moving(name, WAVES, step=1.0):
-            every = own | numbers | {"coefficients": one}
-            said = f"with the {history.replace('_', ' ')}"
-            yield _form(f"{kind.also}, {label} {said}", every, "", None)
+    if kind.base != "viscous":
+        # A dashpot that depends on nothing is in the baseline.
+        fixed["constants"] = (Parameter(f"{name}_0_0", amplitude=True),)
+    for label, one, numbers in moving(name, WAVES, step=1.0):
+        own = fixed | numbers | {"powers": (0,), "coefficients": one}
+        yield _form(f"{kind.also}, {label} with the {words}", own, "", None)
 
 
 def _shapes(

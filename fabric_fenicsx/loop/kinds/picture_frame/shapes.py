@@ -252,8 +252,7 @@ def waves(
     name: str, most: float, overtones: Sequence[int] = (0,), step: float = STEP
 ) -> Iterator[Drawn]:
     """Waves with at most so many cycles over the range, and so many overtones each: as shapes."""
-    periods = tuple((1.0 / np.arange(most, 1.0, -step)).tolist())
-    period = Parameter(f"{name}_period", periods, 0.5 / most, 1.0)
+    period = _period(name, most, step, 1.0)
     for more in overtones:
         own = [
             Parameter(f"{name}_{of}{k + 1 if k else ''}", amplitude=True)
@@ -262,6 +261,12 @@ def waves(
         ]
         label = "periodic" + (f", {more} overtones" if more else "")
         yield label, tuple(own), {"shape": "periodic", "width": period}
+
+
+def _period(name: str, most: float, step: float, longest: float) -> Parameter:
+    """Of a wave with at most so many cycles over the range, looked for in steps of these."""
+    starts = tuple((1.0 / np.arange(most, 1.0, -step)).tolist())
+    return Parameter(f"{name}_period", starts, 0.5 / most, longest)
 
 
 def bumps(name: str, ends: tuple[float, float] = (0.0, 1.0)) -> Iterator[Drawn]:
@@ -294,8 +299,7 @@ def two_bumps(name: str, ends: tuple[float, float] = (0.0, 1.0)) -> Iterator[Dra
 def ringing(name: str, most: float) -> Iterator[Drawn]:
     """A wave that dies away, with at most so many cycles over the range: as shapes."""
     own = tuple(Parameter(f"{name}_{of}", amplitude=True) for of in ("sine", "cosine"))
-    periods = tuple((1.0 / np.arange(most, 1.0, -2.0 * STEP)).tolist())
-    period = Parameter(f"{name}_period", periods, 0.5 / most, 2.0)
+    period = _period(name, most, 2.0 * STEP, 2.0)
     fading = Parameter(f"{name}_fading", FADING, 0.01, 3.0)
     yield "ringing", own, {"shape": "ringing", "width": period, "span": fading}
 
