@@ -271,9 +271,9 @@ class Judge:
         Nothing is explained by what makes holdout runs decidedly less likely than what lacks it, by
         what each model says of them: that specimens differ, and how little it is known there; or by
         what is vague there, in that it expects more than twice the error that what lacks it does,
-        and is off by more than twice the noise. Nor by a term without a formula, or an effect that
-        is another one in each specimen, that makes them less likely, or expects a larger error, at
-        all.
+        and is off by more than twice the noise and more than half as far as that. Nor by a term
+        without a formula, or an effect that is another one in each specimen, that makes them less
+        likely, or expects a larger error, at all.
         """
         out = self.held_rows
         if out.any() and model is not baseline:
@@ -282,8 +282,12 @@ class Judge:
             expected = [self.expected_holdout(m, m.rms(m.used)) for m in both]
             known = all(effect.listed for effect in model.effects) and not self.uneven(model.fit)
             times, more = (CRITERIA.significant, CRITERIA.decisive) if known else (1.0, 0.0)
+            # An exponent that few rates tell expects anything at another one, and may be right.
+            nearer = known and CRITERIA.significant * self.holdout(model.fit) < self.holdout(
+                baseline.fit
+            )
             off = self.holdout(model.fit) > CRITERIA.significant * self.misfit(model).noise
-            vague = expected[0] >= times * expected[1] and off
+            vague = expected[0] >= times * expected[1] and off and not nearer
             if vague or mine >= other + more:
                 return False
         fits = self.fits(model, baseline, roughly=roughly)

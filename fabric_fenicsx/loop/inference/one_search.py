@@ -330,8 +330,24 @@ class Search:
         combinations = self._screened().best(CRITERIA.combinations, count)
         fits = self.models.fitted(combinations, starts=1)
         most = CRITERIA.terms if self._screened_first else None
-        fits += self.models.fitted(self._added_to(fewer), starts=1, base=fewer, most=most)
+        for base in (fewer, *([] if self._screened_first else self._other_forms(fewer))):
+            starts = 1 if self._screened_first else 2
+            fits += self.models.fitted(self._added_to(base), starts=starts, base=base, most=most)
         return self.models.best_refined(self.models.weighed(fits))
+
+    def _other_forms(self, model: Fit) -> list[Fit]:
+        """The best fits of the same effects in other forms.
+
+        The form that does best by itself stands for what other effects do as well.
+        """
+        known: dict[tuple[Variant, ...], Fit] = {}
+        for one in self.models.forms.get(frozenset(self.models.effects_of(model)), ()):
+            first = known.setdefault(one.variants, one)
+            if one.size(CRITERIA.far) < first.size(CRITERIA.far):
+                known[one.variants] = one
+        known.pop(model.variants, None)
+        others = sorted(known.values(), key=lambda one: one.size(CRITERIA.far))
+        return others[: CRITERIA.other_forms]
 
     def _with_one_less(self, levels: list[list[Model]]) -> None:
         """The best model of the last level without each of its effects, among those before it.

@@ -225,8 +225,12 @@ def _lagging_effect(
     )
 
 
-ALIKE = {"dissipative": ("dissipative", "smooth"), "outward": ("outward", "forward")}
-"""Bases of one term: frictions, and ways by |γ| or by γ."""
+ALIKE = {
+    "dissipative": ("dissipative", "smooth"),
+    "outward": ("outward", "forward"),
+    "odd": ("odd", "elastic"),
+}
+"""Bases of one term: frictions, ways by |γ| or by γ, and what is added or is a factor."""
 
 ABOUT = {
     "rest": "state of rest of the elastic moment",
@@ -271,8 +275,12 @@ def _laws(
     fixed |= remembering(name, base, variable, largest)
     if base in (*FRICTION, *ALIKE["outward"]):
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
-    also = f", {base}" if base in ("smooth", "forward") else ""
+    second = base in ("smooth", "forward") or (base, variable) == ("elastic", "angle")
+    also = f", {base}" if second else ""
     drawn = [*shapes(name, wealth(base, variable))]
+    if (base, variable) == ("elastic", "angle"):
+        # Splines are those of an odd moment.
+        drawn = [one for one in drawn if one[2]["shape"] != "spline"]
     if (base, variable) in FINE or variable == "time":
         drawn += [*bumps(name), *two_bumps(name)]
     if variable == "time":
