@@ -23,7 +23,7 @@ NOISE = Variances(Noise(SIGMA))
 WAVE = Parameter("wave", (), amplitude=True)
 
 
-def judged(acts_on="", since=0.5, stated=SIGMA, scatter=SIGMA):
+def judged(acts_on="", since=0.5, stated=SIGMA, scatter=SIGMA, size=1.0):
     """A line that bends: little is seen of that in the fitted run, all of it in the held-out one.
 
     Args:
@@ -31,11 +31,12 @@ def judged(acts_on="", since=0.5, stated=SIGMA, scatter=SIGMA):
         since: where it begins; the fitted run ends at 1, the other one at 2.
         stated: one sigma as it is stated.
         scatter: as it is.
+        size: of the bend.
     """
     t = np.concatenate([np.linspace(0.0, 1.0, 60), np.linspace(0.0, 2.0, 60)])
     run = np.repeat([0, 1], 60)
     bend = np.maximum(t - since, 0.0) ** 2
-    observed = 2.0 + t + bend + scatter * np.random.default_rng(1).normal(size=120)
+    observed = 2.0 + t + size * bend + scatter * np.random.default_rng(1).normal(size=120)
     data = readings(observed, run=run, holdout=(1,), specimen=np.zeros_like(run))
     amplitude = Parameter("bend", (), amplitude=True)
     effect = Effect("bend", "linear", "", (Variant("only", (amplitude,)),), acts_on=acts_on)
@@ -281,6 +282,41 @@ def test_what_specimens_differ_by_may_be_a_further_effect(own_way, more, settled
     differs = replace(model, fit=replace(model.fit, deviations={"a": np.array([0.1])}))
     assert search._settled(model, without)
     assert search._settled(differs, without) is settled
+
+
+@pytest.mark.parametrize(
+    ("acts_on", "size", "explains"), [("", 0.0, False), ("", 20.0, True), ("moment", 20.0, False)]
+)
+def test_what_is_vague_has_to_come_nearer(acts_on, size, explains):
+    """It expects far more than what lacks it does, and is off by more than the noise."""
+    judge, model = judged(acts_on, since=0.85, size=size)
+    without = fit(judge.experiment, (), {"a": 2.0, "b": 1.0}, judge.rows, NOISE)
+    baseline = judge.weighed(without, ())
+    expected = [judge.expected_holdout(one.fit, SIGMA) for one in (model, baseline)]
+    assert expected[0] > 2.0 * expected[1] and judge.holdout(model.fit) > 2.0 * SIGMA
+    assert (judge.holdout(model.fit) < 0.5 * judge.holdout(without)) is (size > 0.0)
+    assert judge.explains(model, baseline) is explains
+
+
+def test_the_best_effect_is_tried_in_its_other_forms():
+    """Each once, that first which leaves least; not in the form that is best by itself."""
+    judge, _ = judged()
+    test = judge.experiment
+    bend = Parameter("bend", (), amplitude=True)
+    forms = tuple(Variant(label, (bend,)) for label in ("one", "two", "three"))
+    effect = Effect("bend", "linear", "", forms)
+    search = Search(test, [effect], lambda done, what: None)
+    start = {"a": 2.0, "b": 1.0, "bend": 1.0}
+    found = [fit(test, (form,), start, test.readings.fit, NOISE) for form in forms]
+    worse = replace(found[1], white=2.0 * found[1].white)
+    search.models.forms[frozenset((effect,))] = [
+        found[0],
+        worse,
+        replace(found[2], white=1.5 * found[2].white),
+        found[1],
+    ]
+    others = search._other_forms(found[0])
+    assert [one.variants[0].label for one in others] == ["two", "three"] and others[0] is found[1]
 
 
 def test_parts_that_cancel_are_no_effect():

@@ -14,6 +14,7 @@ from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.rig_terms import of_the_rig
+from fabric_fenicsx.loop.kinds.picture_frame.shapes import each_specimen
 from fabric_fenicsx.loop.own_effects import read_effects
 from fabric_fenicsx.loop.report.discovered import Discovered
 from fabric_fenicsx.loop.report.effect_file import _plain, effect_file
@@ -264,6 +265,36 @@ def test_what_changes_from_run_to_run(tmp_path, measured, term, slope):
     found = fit(experiment, (variant,), start, experiment.readings.fit, WHITE)
     leaves_noise(experiment, found, 1.1, 1.2)
     assert found.values[f"{term}_1"] / 4.0 == pytest.approx(slope, rel=0.05)
+
+
+def test_each_specimen_is_mounted_in_a_way_of_its_own(tmp_path):
+    """In the held-out run too, of a specimen whose turn it was not; and so says the file."""
+    of_run, zeros = (0, 1, 1, 0, 1), (0.3, -0.2)
+
+    def skewed(t, D, speed, run):
+        return force_of(D + zeros[of_run[run]], speed)
+
+    write(tmp_path / "set", skewed, MORE)
+    file = tmp_path / "set" / "measurement.yaml"
+    text = file.read_text()
+    for letter in ("AB"[k] for k in of_run):
+        text = text.replace("specimen: S", f"specimen: {letter}", 1)
+    file.write_text(text)
+    experiment = PictureFrame([read_measurement(tmp_path / "set")])
+    (term,) = (t for t in experiment.terms if t.name == "travel_of_run")
+    # Which specimens that are by turns would be as well.
+    assert "by turns" not in {form.label for form in term.variants}
+    variant = one_of(experiment, term.name, "each specimen its own")
+    found = nearest(experiment, variant)
+    leaves_noise(experiment, found, 1.1, 1.2)
+    assert [found.values[p.name] for p in variant.parameters] == pytest.approx(zeros, abs=0.02)
+    same_from_its_file(tmp_path, experiment, term, variant, found.values)
+
+
+def test_runs_of_which_each_is_a_specimen_are_no_specimens_over_runs():
+    assert not [*each_specimen("term", (0, 1, 2))] and not [*each_specimen("term", (0, 0, 0))]
+    ((_, coefficients, _),) = each_specimen("term", (0, 1, -1, 0))
+    assert coefficients[0] is coefficients[3] is not coefficients[1] and coefficients[2] == 0.0
 
 
 def recovering_zero(t, D, speed, run):
@@ -541,6 +572,7 @@ def test_numbers_of_a_file_are_python_s():
         ("travel_of_displacement_and_direction", "linear, over a way"),
         ("dissipative_moment_of_time", "time, window"),
         ("odd_moment_of_angle", "angle, two bumps"),
+        ("odd_moment_of_angle", "angle, step, elastic"),
         ("dissipative_moment_of_angle", "angle, corner"),
         ("odd_moment_of_angle_and_path", "angle, bump that moves with the path"),
         ("viscous_moment_of_angle_and_time", "angle, periodic, moving with the time"),
@@ -557,14 +589,19 @@ def test_the_file_is_the_term(tmp_path, name, label):
     variant = next(v for v in effect.variants if v.label == label)
     sizes = iter((0.3, -0.2, 0.4, 0.1))
     values = {p.name: p.starts[0] if p.starts else next(sizes) for p in variant.parameters}
-    found = Discovered("discovered_1", effect, variant, BASE | values, pd.DataFrame(), "formula")
+    same_from_its_file(tmp_path, experiment, effect, variant, BASE | values)
+
+
+def same_from_its_file(tmp_path, experiment, effect, variant, values):
+    """A term as its file has it."""
+    found = Discovered("discovered_1", effect, variant, values, pd.DataFrame(), "formula")
     (tmp_path / "discovered_1.py").write_text(effect_file(found, "made up"))
     # What numpy 2 writes of its numbers needs numpy to be read.
     assert "np." not in (tmp_path / "discovered_1.py").read_text()
     (own,) = read_effects(tmp_path / "discovered_1.py")
     (form,) = own.variants
-    expected, _ = experiment.predict((variant,), BASE | values)
-    without, _ = experiment.predict((), BASE)
+    expected, _ = experiment.predict((variant,), values)
+    without, _ = experiment.predict((), values)
     assert np.abs(expected - without).max() > 2.0 * NOISE
-    same, _ = experiment.predict((form,), BASE | {"discovered_1_amount": 1.0})
+    same, _ = experiment.predict((form,), values | {"discovered_1_amount": 1.0})
     assert same == pytest.approx(expected, abs=1e-12)

@@ -145,6 +145,21 @@ def test_what_the_baseline_imitates_gains_nothing(tried):
     assert scores["same"] == (0.0, 1.0)
 
 
+def test_what_comes_near_the_best_is_among_the_most_promising(tried):
+    _, _, screen = tried
+    ranked = screen.most_promising(6)
+    assert len(ranked) == 6
+    worth = [
+        screen.scores([e])[0][0] - np.log(120.0) * len(e.variants[0].parameters) for e in ranked
+    ]
+    assert worth == sorted(worth, reverse=True)
+    for count in (1, 2):
+        assert screen.most_promising(count) == ranked[:count]
+        for k in (2, 4):
+            near = worth[0] - 0.5 * (worth[k - 1] + worth[k])
+            assert screen.most_promising(count, near) == ranked[:k]
+
+
 def test_sets_of_effects_are_ranked_by_what_they_gain_together(tried):
     """All pairs and, of those that a good pair is part of, triples."""
     test, base, screen = tried

@@ -218,7 +218,10 @@ class Search:
         ]
         found: list[Fit] = []
         alike: list[Fit] = []
-        tried = screen.most_promising(CRITERIA.terms) if self._screened_first else self.effects
+        tried = self.effects
+        if self._screened_first:
+            # What noise hides as it was about the baseline may be as good as the best.
+            tried = screen.most_promising(CRITERIA.terms, CRITERIA.decisive)
         for k, effect in enumerate(tried):
             self.progress(0.1 + 0.4 * k / len(tried), f"fit {effect.name}")
             own = _by_itself(self._signatures[effect])
@@ -228,8 +231,8 @@ class Search:
         singles = self.models.weighed(found) + self.models.weighed(alike)
         levels.append(self.models.best_refined(singles))
         if self._screened_first and not self._settled(_nearest(levels), levels[0][0]):
-            ranked = screen.most_promising(CRITERIA.terms + CRITERIA.glimpsed)
-            later = self._after_a_glimpse(screen, self._signatures, ranked[CRITERIA.terms :])
+            ranked = screen.most_promising(len(tried) + CRITERIA.glimpsed)
+            later = self._after_a_glimpse(screen, self._signatures, ranked[len(tried) :])
             levels[1] = sorted([*levels[1], *later], key=lambda m: m.criterion)
         if self._of_two and not self._settled(_nearest(levels), levels[0][0]):
             of_two = self._over_two_variables(candidates)

@@ -119,10 +119,16 @@ class Screen:
             found.append((score, min(1.0, chance * len(little))))
         return found
 
-    def most_promising(self, count: int) -> list[Effect]:
-        """Effects by what their best form takes off the sum of squares, less what it costs."""
+    def most_promising(self, count: int, near: float = 0.0) -> list[Effect]:
+        """Effects by what their best form takes off the sum of squares, less what it costs.
+
+        Args:
+            count: of them.
+            near: further ones follow as long as theirs is less than that below the best one's.
+        """
         worth = {effect: self._worth[group] for effect, group in self._best_of_each.items()}
-        return sorted(worth, key=lambda effect: worth[effect], reverse=True)[:count]
+        ranked = sorted(worth, key=lambda effect: worth[effect], reverse=True)
+        return [e for k, e in enumerate(ranked) if k < count or worth[e] > worth[ranked[0]] - near]
 
     def best_form(self, effect: Effect) -> Combination:
         """The form of an effect by which it is ranked, in its best shape."""

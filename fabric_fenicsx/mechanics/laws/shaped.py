@@ -187,6 +187,7 @@ def shape_of(
             within ONSET; "window", a step at x₀ and the same step back a span later; "corner",
             c w ln(1 + exp((x − x₀)/w)), which bends at x₀; "two bumps", c₁ e^(−y²) and c₂ times
             the same a span further; "ringing", a wave that dies away, by e^(−x/span);
+            "each", c_k from x = (k − 1/2)/(n − 1) to (k + 1/2)/(n − 1), k from 0, of n > 1 numbers;
             "sign", c tanh(x/w); "sides", c₁ x + c₂ |x|, each side of 0 with a slope of its own;
             "saturating sides", c₁ f(x) for x > 0 and c₂ f(−x) for x < 0 with f of a saturation, and
             "power sides" with |x|^w.
@@ -232,6 +233,9 @@ def shape_of(
         return c[0] * exp(-max_value(past, 0) / width) * (1 + tanh(past / ONSET)) / 2
     if kind == "sign":
         return c[0] * tanh(x / width)
+    if kind == "each":
+        at = x * (len(c) - 1)
+        return sum(conditional(lt(size_of(at - k), 0.5), c_k, 0.0) for k, c_k in enumerate(c))
     if kind == "sides":
         return c[0] * x + c[1] * size_of(x)
     if kind in ("saturating sides", "power sides"):

@@ -84,8 +84,20 @@ class PictureFrame(CrossheadTest):
             whole = self._past_of_specimens["path"] + self._paths
             ranges["path_of_specimen"] = float(whole[fitted].max())
         largest = ranges_of(ranges)
-        of_one = [*terms(largest, self._ends()), *run_terms(largest)]
+        of_one = [*terms(largest, self._ends(), self._specimens), *run_terms(largest)]
         return [*of_one, *products(largest), *rig_products(largest)]
+
+    @property
+    def _specimens(self) -> list[int]:
+        """Of each run the specimen, -1 of those that no fitted run is of; none of several folders.
+
+        The runs of another folder are counted from 0 again.
+        """
+        readings = self.readings
+        if len(np.unique(readings.folder)) > 1:
+            return []
+        of_runs = readings.specimen[np.unique(readings.run, return_index=True)[1]]
+        return [int(s) if s in readings.specimen[readings.fit] else -1 for s in of_runs]
 
     @property
     def one_curve(self) -> OneCurve | None:

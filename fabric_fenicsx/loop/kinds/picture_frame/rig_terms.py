@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
@@ -20,6 +20,7 @@ from .shapes import (
     Y,
     both_sides,
     bumps,
+    each_specimen,
     factor,
     fitted,
     memory_of,
@@ -163,12 +164,15 @@ LINES = ("force_rate", "force_lag", "displacement_lag")
 """Variables of which a term is a multiple."""
 
 
-def rig_terms(largest: Mapping[str, float], ends: Ends) -> Iterator[Effect]:
+def rig_terms(
+    largest: Mapping[str, float], ends: Ends, specimens: Sequence[int] = ()
+) -> Iterator[Effect]:
     """The terms.
 
     Args:
         largest: sizes of the variables; see terms.ranges_of. There are none by what it has not.
         ends: between which shares of these the signed ones are.
+        specimens: of each run; see shapes.each_specimen.
     """
     for acts_on, variables in RIG.items():
         for variable, reported in variables.items():
@@ -176,6 +180,10 @@ def rig_terms(largest: Mapping[str, float], ends: Ends) -> Iterator[Effect]:
                 continue
             name = f"{acts_on}_of_{variable}"
             forms = [*_forms(acts_on, name, variable, largest, ends)]
+            if name == "travel_of_run":
+                own = [*_of_each_specimen(name, specimens)]
+                # What is so at every other run may be another specimen at every other one.
+                forms = own + [form for form in forms if not (own and form.label == "by turns")]
             if name == "reading_of_force":
                 forms += _forms(acts_on, name, "force_size", largest, ends, gain=True)
             if name == "reading_of_speed":
@@ -261,6 +269,16 @@ def _forms(
             gain=gain,
             shape=Shape(X[variable], y, reach, partial(factor, own), own | also, between),
         )
+
+
+def _of_each_specimen(name: str, specimens: Sequence[int]) -> Iterator[FrameVariant]:
+    """As of specimens that were each mounted in a way of their own."""
+    reach = len(specimens) - 1.0
+    for label, coefficients, numbers in each_specimen(name, specimens):
+        own = numbers | {"coefficients": coefficients}
+        shape = Shape(X["run"], Y["travel"], reach, partial(factor, own), own | {"variable": "run"})
+        added = partial(_at, own, reach)
+        yield of_the_rig(label, fitted(own), "travel", "run", added, shape=shape)
 
 
 def _at(numbers: Mapping[str, Any], reach: float, p: Values, x: Any) -> Any:

@@ -23,6 +23,7 @@ __all__ = [
     "Y",
     "both_sides",
     "bumps",
+    "each_specimen",
     "factor",
     "fitted",
     "memory_of",
@@ -151,7 +152,7 @@ Y = {
 def fitted(numbers: Mapping[str, Any]) -> tuple[Parameter, ...]:
     """The parameters among a term's numbers, amplitudes first."""
     every = [*numbers["coefficients"], *numbers.get("constants", ()), *numbers.values()]
-    parameters = [n for n in every if isinstance(n, Parameter)]
+    parameters = dict.fromkeys(n for n in every if isinstance(n, Parameter))
     return tuple(sorted(parameters, key=lambda p: not p.amplitude))
 
 
@@ -359,6 +360,21 @@ def both_sides(name: str) -> Iterator[tuple[str, dict[str, Any]]]:
 def over(variable: str, name: str, wealth: int, reach: float) -> Iterator[Drawn]:
     """Shapes over a variable, as ``shapes``, or over the runs, as ``over_runs``."""
     yield from over_runs(name, reach) if variable == "run" else shapes(name, wealth)
+
+
+def each_specimen(name: str, specimens: Sequence[int]) -> Iterator[Drawn]:
+    """What each specimen has of its own, over the runs: as shapes.
+
+    Args:
+        name: of the term.
+        specimens: of each run, counted from 0; those of which none is fitted are negative.
+    """
+    own = [s for s in dict.fromkeys(specimens) if s >= 0]
+    if len(own) < 2 or len(own) == len(specimens):
+        # Each run is then as it is.
+        return
+    of = {s: Parameter(f"{name}_of_{k + 1}", amplitude=True) for k, s in enumerate(own)}
+    yield "each specimen its own", tuple(of.get(s, 0.0) for s in specimens), {"shape": "each"}
 
 
 def over_runs(name: str, last: float) -> Iterator[Drawn]:

@@ -63,7 +63,11 @@ CYCLES = {
 OVERTONES = {"time": (0, 2), "angle": (0, 2)}
 
 
-def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> list[Effect]:
+def terms(
+    ranges: Mapping[str, float],
+    ends: Ends = MappingProxyType({}),
+    specimens: Sequence[int] = (),
+) -> list[Effect]:
     """The terms of a picture frame.
 
     Args:
@@ -74,13 +78,14 @@ def terms(ranges: Mapping[str, float], ends: Ends = MappingProxyType({})) -> lis
             is that of all runs, where a specimen had several: a memory may then go on from one to
             the next.
         ends: of those that may be negative.
+        specimens: of each run of the one folder; see shapes.each_specimen.
     """
     largest = ranges_of(ranges)
     return [
         *_of_the_crossing(largest),
         *_flowing(largest),
         *_lagging(largest),
-        *rig_terms(largest, ends),
+        *rig_terms(largest, ends, specimens),
     ]
 
 
