@@ -195,6 +195,9 @@ class Search:
             self.models.base = self.models.baseline(self.models.base.values)
             fewer = self.models.with_these_variances(levels[-1][0])
             levels.append(self._together(count, fewer))
+            if self._screened_first and levels[-1]:
+                # Before others take the place of what is only in the wrong form.
+                self._in_other_forms(levels)
             self._with_one_less(levels)
             if self._screened_first and levels[-1]:
                 self._exchanged(levels, fewer)
