@@ -71,7 +71,7 @@ class Criteria:
         products: terms over two variables that are fitted in all forms, and further ones over a
             single one, where more is looked for; convention.
         glimpsed: of which one form is fitted to find those; convention.
-        other_forms: of the best effects, that another effect is tried beside as well; convention.
+        other_forms: of the best effect, beside which others are tried as well; made-up.
         exchanges: times that effects of the best pair are replaced in turn, if that changes it;
             convention.
         most_terms: in one model, terms without a formula among them; convention.
@@ -129,7 +129,7 @@ class Criteria:
     products: int = 3
     glimpsed: int = 16
     exchanges: int = 3
-    other_forms: int = 3
+    other_forms: int = 1
     most_terms: int = 2
     as_little: float = 1.02
     without_formula: float = 3.0

@@ -336,8 +336,10 @@ class Search:
         combinations = self._screened().best(CRITERIA.combinations, count)
         fits = self.models.fitted(combinations, starts=1)
         most = CRITERIA.terms if self._screened_first else None
-        for base in (fewer, *([] if self._screened_first else self._other_forms(fewer))):
-            starts = 1 if self._screened_first else 2
+        # Terms, of which there are many, are tried in their forms when they are found.
+        others = [] if self._screened_first or count > 2 else self._other_forms(fewer)
+        starts = 2 if others else 1
+        for base in (fewer, *others):
             fits += self.models.fitted(self._added_to(base), starts=starts, base=base, most=most)
         return self.models.best_refined(self.models.weighed(fits))
 
