@@ -13,7 +13,7 @@ from .experiment import Experiment
 from .fitting import Fit, fit, parameters_of
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise
-from .starts import SMALL, Combination, fit_combinations
+from .starts import SMALL, Combination, around_jumps, fit_combinations
 from .variances import Variances
 
 __all__ = ["REFINED_WITHIN", "Models", "nearest_forms", "nothing_left"]
@@ -206,6 +206,10 @@ class Models:
         """A model fitted to the end; the old one where there is no solution on the way."""
         try:
             self.experiment.settle(model.fit.variants, model.fit.values)
+            # With its own noise and scatter another side of a jump may be the better one.
+            found = around_jumps(self.experiment, model.fit, CRITERIA.evaluations, None)
+            if found is not model.fit:
+                model = self.judge.weighed(found, model.effects)
             return self._again(model, self.judge.averaged(model), CRITERIA.final_evaluations)
         except SolveError:
             return model

@@ -17,7 +17,15 @@ from .experiment import Experiment
 from .fitting import Fit, fit, linearised, orthogonal_to, parameters_of, soft_size
 from .variances import Variances
 
-__all__ = ["SMALL", "Combination", "Signature", "ToFirstOrder", "fit_combinations", "signatures"]
+__all__ = [
+    "SMALL",
+    "Combination",
+    "Signature",
+    "ToFirstOrder",
+    "around_jumps",
+    "fit_combinations",
+    "signatures",
+]
 
 Array = npt.NDArray[np.float64]
 
@@ -115,7 +123,7 @@ def fit_combinations(
         if sizes[k] <= CRITERIA.worthwhile * min(sizes):
             if not found.converged:
                 found = _again(experiment, found, found.values, evaluations, robust)
-            fits[k] = _around_jumps(experiment, found, evaluations, robust)
+            fits[k] = around_jumps(experiment, found, evaluations, robust)
     return fits
 
 
@@ -396,9 +404,7 @@ def _again(
         return found
 
 
-def _around_jumps(
-    experiment: Experiment, found: Fit, evaluations: int, robust: float | None
-) -> Fit:
+def around_jumps(experiment: Experiment, found: Fit, evaluations: int, robust: float | None) -> Fit:
     """A fit again from other values of a parameter that the readings jump with.
 
     The sum of squares has a step wherever a reading comes to lie on the other side of such a
