@@ -324,7 +324,7 @@ def test_zeros_of_runs_are_a_term(tmp_path):
         run.columns["z_mm"] += zero
     experiment = Cantilever([plain])
     effect = next(t for t in experiment.terms if t.name == "reading_of_run")
-    (variant,) = effect.variants
+    variant = next(v for v in effect.variants if v.label == "zero")
     start = {"C1_MPa": C1} | {p.name: 0.0 for p in variant.parameters}
     white = Variances(Noise(0.05))
     found = fit(experiment, (variant,), start, experiment.readings.fit, white)

@@ -25,7 +25,7 @@ class Parameter:
             cantilever "curvature" or "moment", the largest of them in the fitted baseline.
         jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
             for on both sides.
-        run: the run, counted from 0, that it alone belongs to.
+        run, specimen: the run, or the specimen, counted from 0, that it alone belongs to.
     """
 
     name: str
@@ -37,6 +37,17 @@ class Parameter:
     share_of: str = ""
     jumps: bool = False
     run: int | None = None
+    specimen: int | None = None
+
+    @property
+    def of_one(self) -> bool:
+        """Whether it belongs to one run or one specimen alone."""
+        return self.run is not None or self.specimen is not None
+
+    @property
+    def shared_name(self) -> str:
+        """Its name but for which run or specimen it belongs to."""
+        return self.name.split("_", 1)[1] if self.of_one else self.name
 
     @property
     def one_sided(self) -> bool:

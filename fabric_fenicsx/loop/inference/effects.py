@@ -19,8 +19,11 @@ __all__ = [
     "Shape",
     "Values",
     "Variant",
-    "of_each_run",
+    "of_each",
+    "of_first",
     "of_run",
+    "of_specimen",
+    "of_the_first",
     "scaled",
     "valued",
 ]
@@ -141,15 +144,43 @@ def scaled(effect: Effect, shares: Mapping[str, float]) -> Effect:
 
 def of_run(p: Parameter, run: int) -> Parameter:
     """A parameter as that of one run alone, counted from 0; it may have been another run's."""
-    name = p.name if p.run is None else p.name.split("_", 1)[1]
-    return replace(p, name=f"run{run + 1}_{name}", run=run)
+    return replace(p, name=f"run{run + 1}_{p.shared_name}", run=run)
 
 
-def of_each_run(v: Variant, runs: Sequence[int]) -> Variant:
-    """A form with parameters of their own for each run, counted from 0, where it wants them."""
-    if not getattr(v, "each_run", False):
+def of_specimen(p: Parameter, specimen: int) -> Parameter:
+    """Likewise as that of one specimen alone."""
+    return replace(p, name=f"specimen{specimen + 1}_{p.shared_name}", specimen=specimen)
+
+
+def of_first(p: Parameter) -> Parameter:
+    """The same of the first run or specimen, where it belongs to one alone."""
+    if p.run is not None:
+        return of_run(p, 0)
+    return p if p.specimen is None else of_specimen(p, 0)
+
+
+def of_the_first(v: Variant) -> Variant:
+    """A form with parameters for each run or specimen as it is where there is one alone."""
+    if not any(p.of_one for p in v.parameters):
         return v
-    return replace(v, parameters=tuple(of_run(p, run) for run in runs for p in v.parameters))
+    first = {of_first(p).name: of_first(p) for p in v.parameters}
+    return replace(v, parameters=tuple(first.values()))
+
+
+def of_each(v: Variant, runs: Sequence[int], specimens: Sequence[int]) -> Variant:
+    """A form with parameters of their own for each run or specimen where it wants them.
+
+    Args:
+        v: the form; ``each_run`` or ``each_specimen`` of it says so.
+        runs: those of which readings are fitted, counted from 0.
+        specimens: likewise.
+    """
+    own: list[Parameter] = []
+    if getattr(v, "each_run", False):
+        own = [of_run(p, run) for run in runs for p in v.parameters]
+    elif getattr(v, "each_specimen", False):
+        own = [of_specimen(p, specimen) for specimen in specimens for p in v.parameters]
+    return replace(v, parameters=tuple(own)) if own else v
 
 
 def valued(given: Any, values: Values) -> Any:

@@ -10,14 +10,14 @@ Y the readings there are, y the further run, ε the differences of its specimen 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares, lsq_linear
 
 from ...errors import SolveError
-from .effects import Variant, of_run
+from .effects import of_first, of_the_first
 from .experiment import Experiment
 from .fitting import Fit, parameters_of
 
@@ -156,13 +156,13 @@ class Foretold:
     def __init__(self, known: Known, run: Experiment, scatter: Mapping[str, float]) -> None:
         self.known, self._run = known, run
         variants = known.fitted.variants
-        of_runs = [p for v in variants for p in v.parameters if p.run is not None]
-        self._variants = tuple(_in_one_run(v) for v in variants)
-        # Parameters that a form has in each run: in the further one it may have any of them.
+        of_one = [p for v in variants for p in v.parameters if p.of_one]
+        self._variants = tuple(of_the_first(v) for v in variants)
+        # Parameters of each run or specimen: in the further one it may have any of them.
         self._each: dict[str, list[float]] = {}
-        for p in of_runs:
-            self._each.setdefault(of_run(p, 0).name, []).append(known.fitted.values[p.name])
-        shared = set(known.names) - {p.name for p in of_runs}
+        for p in of_one:
+            self._each.setdefault(of_first(p).name, []).append(known.fitted.values[p.name])
+        shared = set(known.names) - {p.name for p in of_one}
         self._place = {n: k for k, n in enumerate(known.names) if n in shared}
         self._scatter = {
             n: share * abs(known.fitted.values[n])
@@ -264,11 +264,3 @@ def _check_numbers(*arrays: Array) -> None:
     """Refuse readings or slopes that are no numbers, as where a power overflows."""
     if not all(np.isfinite(array).all() for array in arrays):
         raise SolveError("the model is not a number at these parameters")
-
-
-def _in_one_run(variant: Variant) -> Variant:
-    """A form with parameters in each run as it is in one run alone, the first."""
-    alone = {of_run(p, 0).name: of_run(p, 0) for p in variant.parameters if p.run is not None}
-    if not alone:
-        return variant
-    return replace(variant, parameters=tuple(alone.values()))

@@ -12,9 +12,11 @@ __all__ = ["errors_beside", "noise_source", "notes_of"]
 
 #: Said where a run has parameters of its own.
 OWN_ZERO = (
-    "A load cell's zero, and its drift, of each run: in a run that is not fitted they are taken "
-    "from its own readings, so that its error tests the shape of the force, not where it begins."
+    "{} of each run: in a run that is not fitted {} taken from its own readings, so that its error "
+    "tests the shape of the {}, not where it begins."
 )
+OF_A_CELL = "A load cell's zero, and its drift,", "they are", "force"
+OF_A_CAMERA = "The camera's zero", "it is", "strip"
 
 
 def errors_beside(
@@ -56,7 +58,8 @@ def noise_source(judge: Judge, noise: float) -> str:
 
 def notes_of(judge: Judge, chosen: Fit, baseline: Fit) -> list[str]:
     """How the reported model was come by, where that limits what it says."""
-    notes = [OWN_ZERO] if has_own(chosen.variants) else []
+    words = OF_A_CAMERA if judge.experiment.test == "cantilever" else OF_A_CELL
+    notes = [OWN_ZERO.format(*words)] if has_own(chosen.variants) else []
     models = [(baseline, "baseline")]
     models += [(chosen, "reported model")] if chosen is not baseline else []
     for model, name in models:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ...errors import SolveError
 from .criteria import CRITERIA
-from .effects import Variant
+from .effects import Parameter, Variant
 from .experiment import Experiment, Readings
 from .fitting import Fit, fit
 
@@ -100,7 +100,7 @@ def fitted_without(experiment: Experiment, model: Fit, part: Flags) -> Fit | Non
     try:
         return fit(
             experiment,
-            _within(model.variants, model.readings.run[rest]),
+            _within(model.variants, model.readings, rest),
             model.values,
             rest,
             model.variances,
@@ -116,11 +116,18 @@ def has_own(variants: Sequence[Variant]) -> bool:
     return any(p.run is not None for v in variants for p in v.parameters)
 
 
-def _within(variants: Sequence[Variant], runs: npt.NDArray[np.int64]) -> tuple[Variant, ...]:
-    """The same without the parameters of other runs."""
+def _within(
+    variants: Sequence[Variant], readings: Readings, rows: npt.NDArray[np.bool_]
+) -> tuple[Variant, ...]:
+    """The same without the parameters of runs and specimens that have none of these readings."""
+    runs, specimens = (np.unique(of[rows]) for of in (readings.run, readings.specimen))
+
+    def seen(p: Parameter) -> bool:
+        return not p.of_one or p.run in runs or p.specimen in specimens
+
     return tuple(
-        replace(v, parameters=tuple(p for p in v.parameters if p.run is None or p.run in runs))
-        if has_own([v])
-        else v
+        v
+        if all(map(seen, v.parameters))
+        else replace(v, parameters=tuple(filter(seen, v.parameters)))
         for v in variants
     )

@@ -24,7 +24,7 @@ from ...inputs.parameters import Parameter
 from ...mechanics.laws.dashpots import LinearDashpot
 from ...mechanics.laws.springs import PolynomialSpring
 from ..expressions.marching import MOST_KEPT, Marched, Varying, spread
-from ..inference.effects import Effect, Variant, of_each_run, scaled
+from ..inference.effects import Effect, Variant, of_each, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ..inference.noise import estimated_noise
 from ..kept import Kept
@@ -431,7 +431,7 @@ class CrossheadTest:
         elif each and len(runs) == 1:
             # One fitted run cannot tell the two apart: nothing is claimed of the other runs.
             shared = [v for v in shared if getattr(v, "reading", None) is None]
-        return replace(effect, variants=tuple(of_each_run(v, runs) for v in (*shared, *each)))
+        return replace(effect, variants=tuple(of_each(v, runs, ()) for v in (*shared, *each)))
 
     def _each_run(
         self, variant: FrameVariant, values: Mapping[str, float], force: Array
@@ -443,7 +443,7 @@ class CrossheadTest:
         """
         zeros = []
         assert variant.reading is not None
-        names = dict.fromkeys(p.name.split("_", 1)[1] for p in variant.parameters)
+        names = dict.fromkeys(p.shared_name for p in variant.parameters)
         # The form's, not the variant's, which may have parameters of fewer runs.
         key = variant.reading
         if key not in self._compiled:

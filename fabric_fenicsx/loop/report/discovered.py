@@ -67,12 +67,13 @@ def discovered_terms(d: Diagnosis, first: int = 1) -> list[Discovered]:
     found: list[Discovered] = []
     for effect in (e for e in d.effects if not e.listed):
         variant = next(v for v in d.final.variants if v in effect.variants)
+        assert variant.shape is not None
         table = _shape_table(d, variant)
         about = effect.acts_on.replace("_", " ") + ": "
         if table.columns[1].startswith("share_of_"):
             about = table.columns[1].removeprefix("share_of_").replace("_", " ") + " × "
         name = f"discovered_{first + len(found)}"
-        formula = about + _shortest(table)
+        formula = about + (_listed(d, table) if variant.shape.points else _shortest(table))
         found.append(Discovered(name, effect, variant, d.final.values, table, formula))
     return found
 
@@ -234,6 +235,15 @@ def _separated(table: pd.DataFrame) -> str:
     return " × ".join(words)
 
 
+def _listed(d: Diagnosis, table: pd.DataFrame) -> str:
+    """What runs or specimens have that each has a value of its own."""
+    of, value, _ = (str(column) for column in table.columns)
+    numbers = table[of].round().astype(int)
+    names = d.experiment.readings.specimens if of == "specimen" else range(1, max(numbers) + 1)
+    each = zip(table[value], numbers, strict=True)
+    return f"({', '.join(f'{amount:.3g} of {of} {names[n - 1]}' for amount, n in each)})"
+
+
 def _shortest(table: pd.DataFrame) -> str:
     """The formula of fewest numbers that is near a shape; that it has none where there is none."""
     if len(table.columns) > 3:
@@ -302,7 +312,9 @@ def discovered_report(d: Diagnosis, terms: Sequence[Discovered]) -> list[dict[st
                 "meaning": term.effect.meaning,
                 "of": term.effect.name,
                 "rival_names": list(d.rivals.get(term.effect.name, [])),
-                "one_curve": term.effect.name in d.experiment.alike,
+                # Zeros of strips are alike for another reason.
+                "one_curve": term.effect.test != "cantilever"
+                and term.effect.name in d.experiment.alike,
             }
         )
     return reported

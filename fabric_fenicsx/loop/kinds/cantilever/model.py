@@ -26,11 +26,12 @@ from scipy.interpolate import CubicSpline, PPoly
 
 from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect, Parameter, Variant, of_each_run, scaled
+from ...inference.effects import Effect, Parameter, Variant, of_each, scaled
 from ...inference.experiment import NO_DEVIATIONS, Deviations, Law
 from ...measurement.readings import common_noise, readings_of, specimens_of
 from ...measurement.schema import Measurement
 from ..records import FEWEST_BEFORE, earlier_alike, last_run
+from .each_specimen import EachSpecimen, names_of
 from .effects import CANTILEVER_EFFECTS
 from .hanging import HangingTow, Laws, Shape, sum_of
 from .measured_line import scatter_of_x, smooth_line
@@ -124,9 +125,7 @@ class Cantilever:
     ) -> None:
         self.noise = common_noise(measurements)
         self._lay_out(measurements)
-        self._compiled: dict[tuple[StripVariant, str, bool], Marched] = (
-            {} if like is None else like._compiled
-        )
+        self._compiled: dict[tuple[Any, ...], Marched] = {} if like is None else like._compiled
         slope, self.scatter = self._measured_slopes()
         unknown = np.isnan(self._arc)
         self._steepness = np.where(unknown, np.minimum(np.abs(np.tan(slope)), STEEPEST), 0.0)
@@ -156,10 +155,11 @@ class Cantilever:
         )
         self._largest_curvature, self._largest_moment = curvature, moment
         shares = {"curvature": curvature, "moment": moment}
-        runs = np.unique(self._run[self.readings.fit]).tolist()
+        fitted = self.readings.fit
+        each = [np.unique(of[fitted]).tolist() for of in (self._run, self.readings.specimen)]
         effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
         self.effects = [
-            replace(e, variants=tuple(of_each_run(v, runs) for v in e.variants)) for e in effects
+            replace(e, variants=tuple(of_each(v, *each) for v in e.variants)) for e in effects
         ]
 
     @cached_property
@@ -175,7 +175,11 @@ class Cantilever:
             "runs": last_run(self._before, np.unique(self._run[rows])),
             "overhangs": float(len(np.unique(self._length[rows]))),
         }
-        return terms(ranges, np.unique(self._run[rows]).tolist())
+        specimens = np.unique(self.readings.specimen[rows])
+        several = np.unique(np.stack([self._run[rows], self._length[rows]]), axis=1).shape[1]
+        # What each specimen that hung once alone has of its own is what each run has.
+        own = specimens.tolist() if 1 < len(specimens) < several else ()
+        return terms(ranges, np.unique(self._run[rows]).tolist(), own)
 
     @property
     def each_its_own_way(self) -> bool:
@@ -317,9 +321,14 @@ class Cantilever:
 
     def _reached(self, variants: Sequence[StripVariant], values: Mapping[str, float]) -> float:
         """Largest curvature of the strips [1/mm]."""
+        each = EachSpecimen(variants)
         try:
             shapes = [
-                own.tow.solve(values, self._laws(variants, own.upside_down), slopes=False)
+                own.tow.solve(
+                    each.values(values, own.specimen),
+                    self._laws(variants, own.upside_down),
+                    slopes=False,
+                )
                 for own in self._specimens
             ]
         except SolveError:
@@ -341,6 +350,7 @@ class Cantilever:
             "from_the_clamp_mm": np.hypot(self._distance, self._observed),
             "height_mm": np.abs(self._observed),
             "run": self._run + 1.0,
+            "specimen": self.readings.specimen + 1.0,
             "runs_before": np.asarray(self._before, dtype=float)[self._run],
         }
         # Of the curvature there are no readings.
@@ -356,15 +366,18 @@ class Cantilever:
         strips = [v for v in variants if isinstance(v, StripVariant)]
         laws = {turned: self._laws(strips, turned) for turned in (False, True)}
         names = [p.name for p in (*self.baseline, *(p for v in strips for p in v.parameters))]
+        each = EachSpecimen(strips)
         expected = np.zeros(len(self._run))
         slopes = {name: np.zeros(len(self._run)) for name in names}
         shapes: dict[tuple[float, ...], Shape] = {}
         for own in self._specimens:
             factors = {name: 1.0 + float(d[own.specimen]) for name, d in deviations.items()}
             mine = {name: value * factors.get(name, 1.0) for name, value in values.items()}
+            mine = each.values(mine, own.specimen)
             key = (id(own.tow), *mine.values())
             shape = shapes[key] = shapes.get(key) or own.tow.solve(mine, laws[own.upside_down])
             heights, changes = self._heights(own, *self._seen(shape, own, strips, mine))
+            changes = each.slopes(changes, own.specimen)
             for zeros in (v for v in strips if v.each_run):
                 heights, changes = self._with_zero(own, zeros, values, heights, changes)
             expected[own.rows] = heights
@@ -387,7 +400,7 @@ class Cantilever:
         self, kappa: Array, variants: Sequence[StripVariant], values: Mapping[str, float]
     ) -> Law:
         """The same at given curvatures."""
-        laws = self._laws(variants, False)
+        laws, values = self._laws(variants, False), EachSpecimen(variants).values(values)
         per_C1 = self.stiffness_per_C1
         longest = max(own.tow.length for own in self._specimens)
         clamp = {
@@ -467,10 +480,11 @@ class Cantilever:
         What belongs to the strip turns over with it: m(κ) becomes -m(-κ) and κ0 becomes -κ0.
         """
         turned = upside_down and name not in ("slope", "load")
-        key = (variant, name, turned)
+        # The form's, not the variant's, which may have parameters of fewer specimens.
+        key = (name, getattr(variant, name), names_of(variant), turned)
         if key not in self._compiled:
             result, inputs, by_place = LAWS[name]
-            law = Marched(inputs, ("B", *(p.name for p in variant.parameters)))
+            law = Marched(inputs, ("B", *names_of(variant)))
             sign = -1.0 if turned else 1.0
             at = {of: sign * law.at[of] if of == "kappa" else law.at[of] for of in inputs}
             given = (at,) if by_place else tuple(at[of] for of in inputs if of not in PLACE)
@@ -515,10 +529,10 @@ class Cantilever:
             "run": Varying(np.full_like(shape.x, own.tow.run)),
         }
         for v in cameras:
-            key = (v, "camera", False)
+            key = ("camera", v.camera, names_of(v), False)
             if key not in self._compiled:
                 assert v.camera is not None
-                law = Marched(tuple(known), tuple(p.name for p in v.parameters))
+                law = Marched(tuple(known), names_of(v))
                 out, up = v.camera(law.at, law.at)
                 self._compiled[key] = law.define({"x": out, "z": up}, {})
             added = self._compiled[key](known, values)

@@ -26,7 +26,7 @@ from ufl import conditional, lt, max_value, min_value
 from ....inputs.parameters import Parameter
 from ....mechanics.bending_laws import TabulatedBending
 from ....mechanics.scalars import numpy_function, symbol
-from ...inference.effects import Effect, Shape, Values, of_run
+from ...inference.effects import Effect, Shape, Values, of_run, of_specimen
 from ..records import FEWEST_BEFORE
 from .products import products
 from .shapes import (
@@ -76,7 +76,9 @@ ENDS = {"clamp": ("arc_length",), "free end": ("arc_length", "length")}
 """Where places are counted from, and what they are made of."""
 
 
-def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
+def terms(
+    ranges: Mapping[str, float], runs: Sequence[int], specimens: Sequence[int] = ()
+) -> list[Effect]:
     """The terms of a cantilever.
 
     Args:
@@ -85,6 +87,7 @@ def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
             "runs" of its specimen were before one: with less than two there are no terms by them;
             how many different "overhangs" there are.
         runs: that are fitted, counted from 0.
+        specimens: likewise; none where nothing can be told of each.
     """
     found = [
         *_of_the_strip(ranges),
@@ -92,7 +95,12 @@ def terms(ranges: Mapping[str, float], runs: Sequence[int]) -> list[Effect]:
         *_by_run(ranges),
         *products(ranges),
     ]
-    return [*(_with_ranges(term, ranges) for term in found), *_of_the_run(runs)]
+    own = {term.name: term for term in _of_their_own(ranges, runs, specimens)}
+    every = []
+    for term in (_with_ranges(one, ranges) for one in found):
+        of_own = own.pop(term.name).variants if term.name in own else ()
+        every.append(replace(term, variants=(*of_own, *term.variants)))
+    return [*every, *own.values()]
 
 
 def _with_ranges(term: Effect, ranges: Mapping[str, float]) -> Effect:
@@ -338,22 +346,74 @@ def _by_run(ranges: Mapping[str, float]) -> Iterator[Effect]:
         yield strip_effect(name, words, acts_on, ("run",), forms)
 
 
-def _of_the_run(runs: Sequence[int]) -> Iterator[Effect]:
+def _of_their_own(
+    ranges: Mapping[str, float], runs: Sequence[int], specimens: Sequence[int]
+) -> Iterator[Effect]:
+    """What each run, or each specimen, has of its own."""
+    name = "reading_of_run"
+    zero = Parameter(f"{name}_zero_mm", amplitude=True)
+    forms = []
     if len(runs) > 1:
-        name = "reading_of_run"
-        zero = Parameter(f"{name}_zero_mm", amplitude=True)
-        each = tuple(of_run(zero, k) for k in runs)
-        last = max(runs) + 1.0
-        value, points = partial(_of_its_run, each, last), tuple((k + 1) / last for k in runs)
-        shape = Shape("run", "height_mm", last, value, points=points)
-        forms = [StripVariant("zero", each, shape=shape, each_run=True)]
-        yield strip_effect(name, "a zero of the heights in each run", "reading", ("run",), forms)
+        each = [of_run(zero, k) for k in runs]
+        parameters, shape = _each(each, "run", X["z"])
+        forms.append(StripVariant("zero", parameters, shape=shape, each_run=True))
+    scale = Parameter(f"{name}_scale", amplitude=True)
+    for label, own, y, camera in (
+        ("zero", zero, X["z"], lambda p, at: (0.0, p[zero.name])),
+        ("scale", scale, "share_of_height", lambda p, at: (0.0, p[scale.name] * at["z"])),
+    ):
+        forms += _each_specimen(label, own, specimens, y, camera=camera)
+    if forms:
+        about = "heights, or their scale, in each run or of each specimen"
+        yield strip_effect(name, about, "reading", ("run",), forms)
+    if not specimens:
+        return
+    name = "reading_of_distance_and_run"
+    turn = Parameter(f"{name}_turn_rad", amplitude=True)
+    seen = partial(_turned_by, turn.name)
+    forms = _each_specimen("turned", turn, specimens, "turn_rad", camera=seen)
+    about = "a turn of the camera for each specimen"
+    yield strip_effect(name, about, "reading", ("distance", "run"), forms)
+    name = "rest_curvature_of_run"
+    bent = Parameter(f"{name}_0_1_mm", amplitude=True)
+    at_rest = partial(_value_of, bent.name)
+    forms = _each_specimen("even", bent, specimens, Y["rest_curvature"], added_curvature=at_rest)
+    about = "curvature of the unloaded strip that is each specimen's own"
+    yield strip_effect(name, about, "rest_curvature", ("run",), forms)
 
 
-def _of_its_run(each: Sequence[Parameter], last: float, p: Values, x: Any) -> Any:
-    """The zero of the run that has the number x times the last one's, counted from 1."""
-    own = ((q.run + 1, p[q.name]) for q in each if q.run is not None)
-    return sum(conditional(lt(abs(x * last - number), 0.5), zero, 0.0) for number, zero in own)
+def _each_specimen(
+    label: str, own: Parameter, specimens: Sequence[int], y: str, **expression: Any
+) -> list[StripVariant]:
+    """A form of which each specimen has a parameter of its own, if there are specimens."""
+    each = [of_specimen(own, k) for k in specimens]
+    if not each:
+        return []
+    parameters, shape = _each(each, "specimen", y)
+    label = f"{label}, each specimen its own"
+    return [StripVariant(label, parameters, shape=shape, each_specimen=True, **expression)]
+
+
+def _each(own: Sequence[Parameter], of: str, y: str) -> tuple[tuple[Parameter, ...], Shape]:
+    """The parameters of runs or specimens, and their values over these as a shape."""
+    numbers = {p.name: 1.0 + (p.run or p.specimen or 0) for p in own}
+    last = max(numbers.values())
+    points = tuple(number / last for number in numbers.values())
+    return tuple(own), Shape(of, y, last, partial(_of_its_own, numbers, last), points=points)
+
+
+def _of_its_own(numbers: Mapping[str, float], last: float, p: Values, x: Any) -> Any:
+    """What the run or specimen has that has the number x times the last one's, counted from 1."""
+    own = ((number, p[name]) for name, number in numbers.items())
+    return sum(conditional(lt(abs(x * last - number), 0.5), one, 0.0) for number, one in own)
+
+
+def _turned_by(turn: str, p: Values, at: Values) -> tuple[Any, Any]:
+    return turned(p[turn], at)
+
+
+def _value_of(name: str, p: Values, at: Values) -> Any:
+    return p[name]
 
 
 def _higher(

@@ -35,6 +35,8 @@ class StripVariant(Variant):
             place and its own ``x`` and ``z`` [mm].
         each_run: the parameters are the zeros of the heights, one of each run [mm]. That of
             another run can only come from that run: its error is then what is left after it.
+        each_specimen: the expressions' parameters are each specimen's own; one that is not fitted
+            has the mean of the others'.
     """
 
     laws: Callable[[Values], tuple[BendingLaw, ...]] | None = None
@@ -47,6 +49,7 @@ class StripVariant(Variant):
     load: Callable[[Values, Values], Any] | None = None
     camera: Callable[[Values, Values], tuple[Any, Any]] | None = None
     each_run: bool = False
+    each_specimen: bool = False
 
 
 def bending_form(
