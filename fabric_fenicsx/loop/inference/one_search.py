@@ -68,6 +68,8 @@ class Search:
         self.found: Diagnosis | None = None
         #: Effects that every other one was tried beside.
         self._tried: set[frozenset[Effect]] = set()
+        #: Effects that were tried in all their forms, and the forms beside which they were.
+        self._in_all_forms: set[tuple[Effect, frozenset[Variant]]] = set()
         self._kept_screen: Kept[Screen] = Kept(1)
         self._one_by_one: tuple[list[Candidate], list[list[Model]]] | None = None
 
@@ -415,6 +417,9 @@ class Search:
         found: list[Fit] = []
         for effect in best.effects:
             kept = tuple(v for v in best.fit.variants if v not in effect.variants)
+            if (effect, frozenset(kept)) in self._in_all_forms:
+                continue
+            self._in_all_forms.add((effect, frozenset(kept)))
             try:
                 base = fit(
                     self.experiment, kept, best.fit.values, best.fit.used, self.models.variances

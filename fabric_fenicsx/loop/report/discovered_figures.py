@@ -59,6 +59,8 @@ def discovered_figure(diagnosis: Diagnosis, term: Discovered) -> Figure:
             _band(axes, one, f" {level:.2g}", apart)
         title += f", at each {other}"
         axes.margins(x=0.1)
+    elif term.shape.points:
+        axes.errorbar(table[x], table[y], 2.0 * table[f"std_{y}"], fmt="o", color=AFTER)
     else:
         _band(axes, table)
     axes.set_xlabel(x)
@@ -66,6 +68,12 @@ def discovered_figure(diagnosis: Diagnosis, term: Discovered) -> Figure:
     axes.set_title(title, loc="left", fontsize=9)
     _residual(d, panels[1, 1], d.final, along, "after")
     panels[1, 1].set_xlabel(x)
+    if term.shape.points:
+        names = d.experiment.readings.specimens
+        labels = [*names] if x == "specimen" else [f"{number:.0f}" for number in table[x]]
+        for own in (panels[0, 0], axes, panels[1, 1]):
+            own.set_xticks(table[x] if x != "specimen" else np.arange(len(names)) + 1.0, labels)
+            own.margins(x=0.2)
     legend(figure, [panels[0, 0]])
     return figure
 
