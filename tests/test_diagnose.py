@@ -19,7 +19,7 @@ from test_cli import MPI, contents
 from test_drape_loop import angle, made_up, marks, written
 
 from fabric_fenicsx.__main__ import main
-from fabric_fenicsx.loop.diagnose import read_measurement
+from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.fabric import NEAREST
 from fabric_fenicsx.loop.inference.judge import Model
 from fabric_fenicsx.loop.inference.models import nothing_left
@@ -166,6 +166,18 @@ def test_what_is_left_of_nothing_is_in_no_model_of_several(tmp_path, monkeypatch
     assert any(gone) and not all(gone)
     pairs = levels[2]
     assert pairs and not any(nothing_left(model.fit) for model in pairs)
+
+
+@pytest.mark.slow
+def test_terms_are_looked_through_once_for_several_effects_with_names(tmp_path, monkeypatch):
+    """What spares their fits is also what may be imitated by them."""
+    RECIPES["pair-crossover_friction-shear_locking"](tmp_path / "set")
+    looked_through, own = [], Search._alone
+    monkeypatch.setattr(Search, "_alone", lambda self: looked_through.append(self) or own(self))
+    report = diagnose([read_measurement(tmp_path / "set")]).report
+    names = {effect["name"] for effect in report["effects"]}
+    assert names == {"crossover_friction", "shear_locking"}
+    assert sum(any(not e.listed for e in search.effects) for search in looked_through) == 1
 
 
 class Images(HTMLParser):

@@ -73,12 +73,15 @@ def diagnose_test(
         terms, least = [t for t in terms if t.name in alike], CRITERIA.decisive
     else:
         return found
-    single = Search(experiment, terms, progress, most=1)
-    other = single.run()
+    single, other = further, further.found
+    if search.effects_needed == 1 or other is None:
+        single = Search(experiment, terms, progress, most=1)
+        other = single.run()
     search.judge.compared = True
     final = search.judge.weighed(found.final, found.effects)
     gain = final.criterion - other.criterion_after
-    if single.accounted and single.effects_needed == 1 and gain > least:
+    named = bool(other.effects) and all(effect.listed for effect in other.effects)
+    if single.accounted and single.effects_needed == 1 and gain > least and not named:
         if gain < CRITERIA.decisive:
             for names_of in other.rivals.values():
                 names_of += [effect.name for effect in found.effects]
