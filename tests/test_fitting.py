@@ -13,7 +13,7 @@ from measurements.sets import sixty
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
-from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.fitting import _uncertainty, fit
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.validation import cross_validated, parts_by
@@ -345,3 +345,12 @@ def test_walds_statistic_is_that_of_what_is_known():
     assert model.wald(["a"], []) == pytest.approx(r[0] ** 2 / covariance[0, 0], rel=1e-6)
     alone = model.values["a"] ** 2 * np.linalg.inv(covariance)[0, 0]
     assert model.wald(["a"], ["b", "c"]) == pytest.approx(alone, rel=1e-6)
+
+
+def test_errors_where_divide_and_conquer_does_not_converge():
+    """Of columns of specimens that are all but alike, which LAPACK's dsyevd gives up on."""
+    information = np.load(Path(__file__).parent / "data" / "information.npy")
+    J = np.linalg.cholesky(information).T
+    std, _, root = _uncertainty(J)
+    np.testing.assert_allclose(root @ root.T, np.linalg.inv(information), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(std, np.sqrt(np.linalg.inv(information).diagonal()), rtol=1e-6)

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import eigh
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
@@ -498,7 +499,8 @@ def _uncertainty(J: Array) -> tuple[Array, Array, Array]:
     safe = np.where(dead, 1.0, scale)
     information = (J / safe).T @ (J / safe)
     information[dead, dead] = 1.0
-    known, vectors = np.linalg.eigh(information)
+    # By QR iterations: divide and conquer, as in numpy, may not converge where columns are alike.
+    known, vectors = eigh(information, driver="ev")
     scaled_root = vectors / np.sqrt(np.maximum(known, LEAST_KNOWN * known[-1]))
     std = np.linalg.norm(scaled_root, axis=1)
     correlation = (scaled_root @ scaled_root.T) / np.outer(std, std)

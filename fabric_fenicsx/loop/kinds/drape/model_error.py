@@ -23,6 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import eigh
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
 
@@ -189,6 +190,6 @@ def _modes(side: Array, size: Array, length: float, count: int) -> list[ShearFie
             away = np.linalg.norm(place[:, None] - image * (a, b), axis=2)
             covariance += a * b * matern(away, length)
     s = size.ravel()
-    values, vectors = np.linalg.eigh(s[:, None] * covariance * s)
+    values, vectors = eigh(s[:, None] * covariance * s, driver="ev")
     largest = [k for k in np.argsort(values)[::-1][:count] if values[k] > 0.0]
     return [ShearField.of_quarter(place, np.sqrt(values[k]) * vectors[:, k]) for k in largest]
