@@ -124,6 +124,29 @@ def test_sliders_side_by_side_are_near_any_hysteresis(law, most):
     assert nearest("crossover_friction", "sliders side by side", exact_steps(law), free) < most
 
 
+@pytest.mark.parametrize(
+    ("label", "first"),
+    [
+        ("sliders spread evenly", lambda x: x * (1.0 - np.log(np.maximum(x, 1e-12)))),
+        ("sliders of one stiffness", lambda x: x * (2.0 - x)),
+    ],
+)
+def test_sliders_that_are_spread_are_a_continuum(label, first):
+    """First loading in closed form, and on the way back that scaled by two (Masing)."""
+    last = 0.3
+
+    def loading(gamma):
+        return first(np.minimum(gamma / last, 1.0))
+
+    out, back = np.linspace(0.0, 0.2, 81), np.linspace(0.2, -0.2, 161)[1:]
+    moment = np.r_[loading(out), loading(0.2) - 2.0 * loading((0.2 - back) / 2.0)]
+    gammas = np.r_[out, back]
+    variant = named(PICTURE_FRAME_EFFECTS, "crossover_friction", label)
+    (own,) = columns(variant, {"slip_angle_rad": last}, gammas, 0.0 * gammas)
+    assert own == pytest.approx(moment, abs=0.04)
+    assert np.sqrt(np.mean((own - moment) ** 2)) < 0.015
+
+
 RATES = np.repeat([-1.0, -0.5, -0.2, -0.07, -0.02, 0.02, 0.07, 0.2, 0.5, 1.0], 3)
 STILL = np.zeros_like(RATES)
 

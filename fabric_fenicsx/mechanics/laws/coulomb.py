@@ -50,6 +50,29 @@ def _sliders(*multiples: float) -> tuple[dict[str, Any], ...]:
     )
 
 
+LAST_SLIP = replace(
+    FIRST_SLIP, starts=(0.02, 0.06, 0.2), upper=0.5, meaning="shear until all sliders slide"
+)
+SPREAD = 8
+"""Sliders that stand for all those between no slip angle and the last."""
+
+
+def _spread(*, one_stiffness: bool) -> tuple[dict[str, Any], ...]:
+    """As many sliders at each slip angle up to the last, γ_l, as at any other.
+
+    The first loading is m_c ξ (1 − ln ξ), ξ = γ/γ_l, of limits alike, and m_c ξ (2 − ξ) where all
+    have one stiffness, so that limits grow with the slip angle (Iwan's even distribution).
+    """
+    shares = [(k + 0.5) / SPREAD for k in range(SPREAD)]
+    return tuple(
+        {
+            "limit": Times((2.0 * share if one_stiffness else 1.0) / SPREAD, LIMIT),
+            "stick_angle": Times(share, LAST_SLIP),
+        }
+        for share in shares
+    )
+
+
 @dataclass(frozen=True)
 class CoulombFriction(CrossingLaw):
     """Elastic up to a limit m_c (1 + a |γ|), then sliding. ψ = M²/2k of the stick.
@@ -78,6 +101,18 @@ class CoulombFriction(CrossingLaw):
         ),
         # Near any hysteresis that does not depend on the rate, whatever its formula.
         Form("crossover_friction", "sliders side by side", _sliders(1.0, 2.5, 6.0), rank=5),
+        Form(
+            "crossover_friction",
+            "sliders spread evenly",
+            _spread(one_stiffness=False),
+            rank=7,
+        ),
+        Form(
+            "crossover_friction",
+            "sliders of one stiffness",
+            _spread(one_stiffness=True),
+            rank=7,
+        ),
     )
 
     @property
