@@ -53,8 +53,8 @@ class Search:
         self.judge = self.models.judge
         #: Whether the chosen model leaves noise in the fitted readings; holdout runs have no say.
         self.accounted = False
-        #: How many effects it has.
-        self.effects_needed = 0
+        #: That model.
+        self.chosen: Model | None = None
         #: Whether noise is more than was stated for that, or slow.
         self.doubtful_noise = False
         #: Whether specimens differ in it.
@@ -73,6 +73,11 @@ class Search:
         self._kept_screen: Kept[Screen] = Kept(1)
         self._one_by_one: tuple[list[Candidate], list[list[Model]]] | None = None
 
+    @property
+    def of_one_effect(self) -> bool:
+        """Whether the chosen model has a single one."""
+        return self.chosen is not None and len(self.chosen.effects) == 1
+
     # Search -------------------------------------------------------------------------------
 
     def run(self) -> Diagnosis:
@@ -89,13 +94,14 @@ class Search:
         chosen = chosen_model(self.judge, levels, terms=self._screened_first)
         verdict = verdict_on(self.judge, baseline, chosen)
         self.accounted = self.judge.accounts(chosen, baseline)
-        self.effects_needed = len(chosen.effects)
         self.doubtful_noise = self.judge.doubtful_noise(chosen)
         self.specimens_differ = bool(chosen.fit.deviations)
         nearest = _nearest(levels)
         final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
         if final.effects:
             final = self.models.last(final)
+        # Held-out runs, by which it may be contradicted, do not say whether to look further.
+        self.chosen = final if final.effects else chosen
         self.progress(0.9, "rivals")
         judged = final if verdict != "unexplained" else nearest
         misfit = self.judge.misfit(judged)

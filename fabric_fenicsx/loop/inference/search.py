@@ -17,6 +17,7 @@ from .criteria import CRITERIA
 from .diagnosis import Diagnosis
 from .effects import Effect
 from .experiment import Experiment
+from .fitting import Fit
 from .judge import Model
 from .models import nearest_forms
 from .one_search import Search
@@ -57,12 +58,14 @@ def diagnose_test(
     if not search.accounted:
         further.most = None
         return _beside(further.run(), found)
-    own = [effect.name for effect in found.effects]
+    chosen = search.chosen
+    assert chosen is not None
+    own = [effect.name for effect in chosen.effects]
     alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
     in_its_way = experiment.each_its_own_way and search.specimens_differ
-    doubtful = in_its_way or _at_the_edge(found) or search.judge.uneven(found.final)
+    doubtful = in_its_way or _at_the_edge(chosen.fit) or search.judge.uneven(chosen.fit)
     rivals = bool(own) and (experiment.terms_are_rivals or doubtful)
-    if search.effects_needed > 1:
+    if len(own) > 1:
         # Several effects with names may imitate a single one that has none.
         least = -CRITERIA.decisive
     elif search.doubtful_noise or rivals:
@@ -74,18 +77,18 @@ def diagnose_test(
     else:
         return found
     single, other = further, further.found
-    if search.effects_needed == 1 or other is None:
+    if len(own) < 2 or other is None:
         single = Search(experiment, terms, progress, most=1)
         other = single.run()
     search.judge.compared = True
-    final = search.judge.weighed(found.final, found.effects)
+    final = search.judge.weighed(chosen.fit, chosen.effects)
     gain = final.criterion - other.criterion_after
     named = bool(other.effects) and all(effect.listed for effect in other.effects)
-    if single.accounted and single.effects_needed == 1 and gain > least and not named:
+    if single.accounted and single.of_one_effect and gain > least and not named:
         if gain < CRITERIA.decisive:
             for names_of in other.rivals.values():
                 names_of += [effect.name for effect in found.effects]
-        elif search.effects_needed == 1:
+        elif len(found.effects) == 1 and other.effects:
             _name(single, other, other.effects[0], search, found.effects[0])
         if single.doubtful_noise:
             several = _several(further, other.criterion_after)
@@ -102,7 +105,7 @@ def diagnose_test(
         several = _several(further, final.criterion)
         if several is not None:
             return _beside(several, found)
-    if search.effects_needed == 1 and (rivals or alike):
+    if len(found.effects) == 1 and (rivals or alike):
         _name_terms(search, found, final, single, other)
     return found
 
@@ -115,13 +118,13 @@ def _several(further: Search, criterion: float) -> Diagnosis | None:
     return found if further.accounted and better else None
 
 
-def _at_the_edge(found: Diagnosis) -> bool:
+def _at_the_edge(model: Fit) -> bool:
     """Whether a number of the effects that were found, other than an amplitude, is at its bound.
 
     A form at the edge of what it may be may stand for another law.
     """
-    free = {p.name for v in found.final.variants for p in v.parameters if not p.amplitude}
-    return bool(free & set(found.final.at_bound))
+    free = {p.name for v in model.variants for p in v.parameters if not p.amplitude}
+    return bool(free & set(model.at_bound))
 
 
 def _beside(further: Diagnosis, found: Diagnosis) -> Diagnosis:
