@@ -1,6 +1,7 @@
 """What a model may be believed by: noise as it was stated, held-out runs that are foretold."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.judge import Judge
-from fabric_fenicsx.loop.inference.models import cancelling
+from fabric_fenicsx.loop.inference.models import _simplest_first, cancelling
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.one_search import Search
 from fabric_fenicsx.loop.inference.search import diagnose_test
@@ -331,3 +332,27 @@ def test_parts_that_cancel_are_no_effect():
         test = Linear(readings(observed), columns, ("a",))
         model = fit(test, (form,), values, test.readings.fit, NOISE)
         assert cancelling(model) is (size > 1.0)
+
+
+@pytest.mark.parametrize(
+    ("criteria", "first"),
+    [
+        # As good: the one that goes by one variable, then the one of fewer numbers.
+        ((0.0, 0.5, 0.9), 1),
+        ((0.0, 1.5, 0.9), 2),
+        ((0.0, 1.5, 1.6), 0),
+    ],
+)
+def test_of_models_that_are_as_good_the_simplest_comes_first(criteria, first):
+    of_two, of_one = (
+        SimpleNamespace(depends_on=variables) for variables in (("height", "run"), ("length",))
+    )
+    kinds = ((of_two, 2), (of_one, 2), (of_one, 3))
+    models = [
+        SimpleNamespace(
+            criterion=criterion, effects=(effect,), fit=SimpleNamespace(values=range(count))
+        )
+        for criterion, (effect, count) in zip(criteria, kinds, strict=True)
+    ]
+    in_order = sorted(models, key=lambda m: m.criterion)
+    assert _simplest_first(in_order)[0] is models[first]

@@ -34,6 +34,10 @@ def test_a_strip_that_softens_in_bending(tmp_path):
     In heights at given arc lengths, a constant stiffness leaves 5.0 mm rms.
     """
     report = report_of("aalborg-strip-a", tmp_path)
+    assert report["verdict"] == "effect_found"
+    named = {effect["name"] for effect in report["effects"]}
+    assert named == {"nonlinear_bending", "residual_curvature"}
+    assert report["error"]["after"]["holdout"] < 1.5 * report["error"]["noise"]
     assert report["error"]["before"]["fit"] == pytest.approx(5.0, rel=0.03)
     candidates = {c["name"]: c["error_fit"] for c in report["candidates"]}
     assert candidates["nonlinear_bending"] < 0.6

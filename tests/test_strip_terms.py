@@ -120,6 +120,11 @@ def bell(s, place, width):
     return np.exp(-(((s - place) / width) ** 2))
 
 
+def wavy(x):
+    turn = 2.0 * np.pi * x / 0.5
+    return 0.8 * np.sin(turn) + 0.5 * (np.cos(turn) - 1.0)
+
+
 #: Name and label of a form, its parameters, and the same for the strip by shooting.
 CASES = {
     "stiffness, spline": (
@@ -137,6 +142,11 @@ CASES = {
         ("bending_moment_of_arc_length", "bump, from the clamp"),
         {"1": 1.5, "place": 0.2, "width": 0.1},
         {"stiffer": lambda s: np.exp(1.5 * (1.0 - bell(s / 250, 0.2, 0.1)))},
+    ),
+    "stiffness, in waves": (
+        ("bending_moment_of_arc_length", "periodic, from the clamp"),
+        {"sine": 0.8, "cosine": 0.5, "period": 0.5},
+        {"stiffer": lambda s: np.exp(wavy(0.2) - wavy(s / 250))},
     ),
     "rest curvature": (
         ("rest_curvature_of_arc_length", "decay, from the clamp"),

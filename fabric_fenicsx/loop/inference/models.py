@@ -28,8 +28,8 @@ MOST_NEAR, OF_A_SET = 6, 2
 REFINED = 3
 #: ... if their criterion is within this of the best.
 REFINED_WITHIN = 60.0
-#: Difference of criteria below which a form of fewer parameters is the better one: another that has
-#: one on its bound is the same model.
+#: Difference of criteria below which the simpler model is the better one: another form that has a
+#: parameter on its bound is the same model.
 AS_GOOD = 1.0
 
 
@@ -292,17 +292,20 @@ class Models:
 
 
 def _simplest_first(models: list[Model]) -> list[Model]:
-    """The best first, or one of the same effects that is as good and has fewer parameters."""
+    """The best first, or one that is as good, goes by fewer variables or has fewer parameters.
+
+    As many effects are in each. One with a name, and its formula, goes by none.
+    """
     if not models:
         return models
-    best = models[0]
-    alike = [
-        m
-        for m in models
-        if set(m.effects) == set(best.effects) and m.criterion < best.criterion + AS_GOOD
-    ]
-    first = min(alike, key=lambda m: len(m.fit.values))
+    alike = [m for m in models if m.criterion < models[0].criterion + AS_GOOD]
+    first = min(alike, key=_complexity)
     return [first, *(m for m in models if m is not first)]
+
+
+def _complexity(model: Model) -> tuple[int, int]:
+    variables = sum(len(effect.depends_on) for effect in model.effects)
+    return variables, len(model.fit.values)
 
 
 def nothing_left(model: Fit) -> bool:

@@ -83,8 +83,12 @@ def diagnose_test(
     search.judge.compared = True
     final = search.judge.weighed(chosen.fit, chosen.effects)
     gain = final.criterion - other.criterion_after
+    if _at_the_edge(other.final):
+        # It may stand for another law as well as they.
+        least = CRITERIA.decisive
+    alone = single.accounted and single.of_one_effect
     named = bool(other.effects) and all(effect.listed for effect in other.effects)
-    if single.accounted and single.of_one_effect and gain > least and not named:
+    if alone and gain > least and not named:
         if gain < CRITERIA.decisive:
             for names_of in other.rivals.values():
                 names_of += [effect.name for effect in found.effects]
@@ -95,6 +99,12 @@ def diagnose_test(
             if several is not None:
                 return _beside(several, found)
         return _beside(other, found)
+    if alone and len(found.effects) > 1 and abs(gain) < CRITERIA.decisive and not named:
+        _rival_of_all(search, found, final, single, other)
+    if not own and single.accounted and single.chosen is not None and single.chosen.effects:
+        if final.criterion - single.chosen.criterion > CRITERIA.decisive:
+            # Held-out runs contradict it, which does not make a misfit noise.
+            return _beside(other, found)
     nearest = min((m.criterion for m in single.singles), default=float("inf"))
     if own and not single.accounted and nearest < final.criterion - CRITERIA.decisive:
         # What is beaten so is not it, whether or not what beats it is all that there is.
@@ -158,6 +168,30 @@ def _name_terms(
         found.candidates.append(candidate)
         if near(single.models, model, final, shapes=True):
             _name(search, found, own, single, candidate.effect)
+
+
+def _rival_of_all(
+    search: Search, found: Diagnosis, final: Model, single: Search, other: Diagnosis
+) -> None:
+    """Name a single term as a rival of several listed effects, which it explains together.
+
+    Args:
+        search: of the effects with a name.
+        found: its diagnosis.
+        final: its model, weighed as terms are.
+        single: the search for one term.
+        other: what that found.
+    """
+    (rival,) = other.effects
+    if len(found.pairs) < CRITERIA.pairs:
+        mine = nearest_forms(search.models.forms[frozenset(found.effects)])
+        its = nearest_forms(single.models.forms[frozenset({rival})])
+        found.pairs.append((found.effects[0].name, mine, rival.name, its))
+    candidate = next(c for c in other.candidates if c.effect is rival)
+    candidate.criterion = found.criterion_after + other.criterion_after - final.criterion
+    found.candidates.append(candidate)
+    for names in found.rivals.values():
+        names.append(rival.name)
 
 
 def _name(search: Search, found: Diagnosis, own: Effect, another: Search, rival: Effect) -> None:

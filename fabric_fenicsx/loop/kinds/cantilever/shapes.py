@@ -134,7 +134,9 @@ def wave(name: str, overtones: int = 0, *, constant: bool = True) -> Drawn:
         for of in ("sine", "cosine")
     )
     periods = tuple((1.0 / np.arange(WAVES, 0.9, -STEP)).tolist())
-    period = Parameter(f"{name}_period", periods, 0.5 / WAVES, 2.0)
+    # Overtones of half a wave are any curve at all.
+    longest = 1.0 if overtones else 2.0
+    period = Parameter(f"{name}_period", periods, 0.5 / WAVES, longest)
 
     def around(p: Values, x: Any) -> Any:
         level = sum(p[c.name] for c in zero)

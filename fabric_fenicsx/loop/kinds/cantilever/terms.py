@@ -35,6 +35,7 @@ from .shapes import (
     LARGEST,
     SHARPEST,
     SPLINES,
+    Drawn,
     Of,
     along_the_strip,
     coefficient,
@@ -170,7 +171,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
             added_moment=partial(_flexible, g, end, longest),
         )
         for end in ENDS
-        for label, parameters, g in along_the_strip(name, end)
+        for label, parameters, g in _stiffnesses(name, end)
     ]
     about = "bending stiffness that varies along the strip"
     yield strip_effect(name, about, "bending_moment", ("arc_length",), forms)
@@ -222,6 +223,14 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
             for drawn in over_overhangs(name, ranges.get("overhangs", 0.0), constant=constant)
         ]
         yield strip_effect(name, f"{about} that goes by the overhang", acts_on, ("length",), forms)
+
+
+def _stiffnesses(name: str, end: str) -> Iterator[Drawn]:
+    """Shapes of a log-flexibility, at two places or in waves as well, as of binder by the pitch."""
+    yield from along_the_strip(name, end)
+    if end == "clamp":
+        yield two_places(name)
+        yield wave(name, constant=False)
 
 
 def _centred(g: Of, end: str, p: Values, x: Any) -> Any:
