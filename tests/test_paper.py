@@ -69,9 +69,10 @@ def test_drapes_of_the_three_spacings(paper, tmp_path):
     for key, value in results["largest_shear_deg"].items():
         assert 30.0 < value < 40.0, key
     for spacing in (12, 10):
-        # The waves of frictionless tools, and what friction under a holder leaves of them.
-        assert results["zigzag_deg"][spacing, 0.0, None] > 2.0
-        assert results["zigzag_deg"][spacing, 0.3, 1000.0] < 1.2
+        # The waves of frictionless tools, of which friction under a holder leaves less than half.
+        free = results["zigzag_deg"][spacing, 0.0, None]
+        assert free > 2.0
+        assert results["zigzag_deg"][spacing, 0.3, 1000.0] < 0.5 * free
     assert "{" not in results["page"]
     for name in ("drape", "cantilever", "picture_frame"):
         assert 10_000 < (tmp_path / f"paper_{name}.png").stat().st_size < 200_000
