@@ -73,11 +73,6 @@ class Search:
         self._kept_screen: Kept[Screen] = Kept(1)
         self._one_by_one: tuple[list[Candidate], list[list[Model]]] | None = None
 
-    @property
-    def of_one_effect(self) -> bool:
-        """Whether the chosen model has a single one."""
-        return self.chosen is not None and len(self.chosen.effects) == 1
-
     # Search -------------------------------------------------------------------------------
 
     def run(self) -> Diagnosis:

@@ -86,23 +86,23 @@ def diagnose_test(
     if _at_the_edge(other.final):
         # It may stand for another law as well as they.
         least = CRITERIA.decisive
-    alone = single.accounted and single.of_one_effect
-    named = bool(other.effects) and all(effect.listed for effect in other.effects)
-    if alone and gain > least and not named:
+    alone = single.accounted and [effect.listed for effect in other.effects] == [False]
+    if alone and gain > least:
         if gain < CRITERIA.decisive:
             for names_of in other.rivals.values():
                 names_of += [effect.name for effect in found.effects]
-        elif len(found.effects) == 1 and other.effects:
+        elif len(found.effects) == 1:
             _name(single, other, other.effects[0], search, found.effects[0])
         if single.doubtful_noise:
             several = _several(further, other.criterion_after)
             if several is not None:
                 return _beside(several, found)
         return _beside(other, found)
-    if alone and len(found.effects) > 1 and abs(gain) < CRITERIA.decisive and not named:
+    if alone and len(found.effects) > 1 and abs(gain) < CRITERIA.decisive:
         _rival_of_all(search, found, final, single, other)
-    if not own and single.accounted and single.chosen is not None and single.chosen.effects:
-        if final.criterion - single.chosen.criterion > CRITERIA.decisive:
+    preferred = single.chosen
+    if not own and single.accounted and preferred is not None and preferred.effects:
+        if final.criterion - preferred.criterion > CRITERIA.decisive:
             # Held-out runs contradict it, which does not make a misfit noise.
             return _beside(other, found)
     nearest = min((m.criterion for m in single.singles), default=float("inf"))
@@ -173,14 +173,9 @@ def _name_terms(
 def _rival_of_all(
     search: Search, found: Diagnosis, final: Model, single: Search, other: Diagnosis
 ) -> None:
-    """Name a single term as a rival of several listed effects, which it explains together.
+    """Name a single term as a rival of the listed effects that it explains together.
 
-    Args:
-        search: of the effects with a name.
-        found: its diagnosis.
-        final: its model, weighed as terms are.
-        single: the search for one term.
-        other: what that found.
+    What is given is as for ``_name_terms``, but of several effects.
     """
     (rival,) = other.effects
     if len(found.pairs) < CRITERIA.pairs:
