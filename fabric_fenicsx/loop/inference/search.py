@@ -86,7 +86,8 @@ def diagnose_test(
     if _at_the_edge(other.final):
         # It may stand for another law as well as they.
         least = CRITERIA.decisive
-    alone = single.accounted and [effect.listed for effect in other.effects] == [False]
+    one = other.effects[0] if len(other.effects) == 1 else None
+    alone = single.accounted and one is not None and not one.listed
     if alone and gain > least:
         if gain < CRITERIA.decisive:
             for names_of in other.rivals.values():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Effect, Shape, Variant
 from .words import parameter_unit
 
-__all__ = ["Discovered", "discovered_report", "discovered_terms"]
+__all__ = ["Discovered", "discovered_report", "discovered_terms", "names_of"]
 
 Array = npt.NDArray[np.float64]
 
@@ -238,10 +238,14 @@ def _separated(table: pd.DataFrame) -> str:
 def _listed(d: Diagnosis, table: pd.DataFrame) -> str:
     """What runs or specimens have that each has a value of its own."""
     of, value, _ = (str(column) for column in table.columns)
-    numbers = table[of].round().astype(int)
-    names = d.experiment.readings.specimens if of == "specimen" else range(1, max(numbers) + 1)
-    each = zip(table[value], numbers, strict=True)
-    return f"({', '.join(f'{amount:.3g} of {of} {names[n - 1]}' for amount, n in each)})"
+    each = zip(table[value], names_of(d, of, table[of]), strict=True)
+    return f"({', '.join(f'{amount:.3g} of {of} {name}' for amount, name in each)})"
+
+
+def names_of(d: Diagnosis, of: str, numbers: Iterable[float]) -> list[str]:
+    """What a report calls runs, or specimens, that have these numbers, counted from 1."""
+    specimens = d.experiment.readings.specimens
+    return [specimens[round(n) - 1] if of == "specimen" else f"{n:.0f}" for n in numbers]
 
 
 def _shortest(table: pd.DataFrame) -> str:

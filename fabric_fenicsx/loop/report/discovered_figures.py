@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Variant
 from ..inference.fitting import Fit
-from .discovered import Discovered
+from .discovered import Discovered, names_of
 from .drawing import AFTER, FAINT, blank, legend, quantity_label
 from .residuals import residual_points
 
@@ -69,10 +69,10 @@ def discovered_figure(diagnosis: Diagnosis, term: Discovered) -> Figure:
     _residual(d, panels[1, 1], d.final, along, "after")
     panels[1, 1].set_xlabel(x)
     if term.shape.points:
-        names = d.experiment.readings.specimens
-        labels = [*names] if x == "specimen" else [f"{number:.0f}" for number in table[x]]
+        every = np.arange(len(d.experiment.readings.specimens)) + 1.0
+        at = every if x == "specimen" else table[x]
         for own in (panels[0, 0], axes, panels[1, 1]):
-            own.set_xticks(table[x] if x != "specimen" else np.arange(len(names)) + 1.0, labels)
+            own.set_xticks(at, names_of(d, x, at))
             own.margins(x=0.2)
     legend(figure, [panels[0, 0]])
     return figure

@@ -155,8 +155,7 @@ class Cantilever:
         )
         self._largest_curvature, self._largest_moment = curvature, moment
         shares = {"curvature": curvature, "moment": moment}
-        fitted = self.readings.fit
-        each = [np.unique(of[fitted]).tolist() for of in (self._run, self.readings.specimen)]
+        each = self._fitted
         effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
         self.effects = [
             replace(e, variants=tuple(of_each(v, *each) for v in e.variants)) for e in effects
@@ -175,11 +174,10 @@ class Cantilever:
             "runs": last_run(self._before, np.unique(self._run[rows])),
             "overhangs": float(len(np.unique(self._length[rows]))),
         }
-        specimens = np.unique(self.readings.specimen[rows])
-        several = np.unique(np.stack([self._run[rows], self._length[rows]]), axis=1).shape[1]
+        runs, specimens = self._fitted
         # What each specimen that hung once alone has of its own is what each run has.
-        own = specimens.tolist() if 1 < len(specimens) < several else ()
-        return terms(ranges, np.unique(self._run[rows]).tolist(), own)
+        several = 1 < len(specimens) < self._overhangs_of(self._run).shape[1]
+        return terms(ranges, runs, specimens if several else ())
 
     @property
     def each_its_own_way(self) -> bool:
@@ -195,9 +193,19 @@ class Cantilever:
 
     def _one_overhang_each(self, of: npt.NDArray[np.int64]) -> bool:
         """Whether every number of the fitted readings goes with one overhang, and that with it."""
-        rows = self.readings.fit
-        pairs = np.unique(np.stack([of[rows], self._length[rows]]), axis=1)
+        pairs = self._overhangs_of(of)
         return all(len(np.unique(one)) == pairs.shape[1] for one in pairs)
+
+    def _overhangs_of(self, of: npt.NDArray[np.int64]) -> Array:
+        """Every number of the fitted readings with every overhang that goes with it, (2, n)."""
+        rows = self.readings.fit
+        return np.unique(np.stack([of[rows], self._length[rows]]), axis=1)
+
+    @property
+    def _fitted(self) -> tuple[list[int], list[int]]:
+        """Runs and specimens of the fitted readings, counted from 0."""
+        rows = self.readings.fit
+        return np.unique(self._run[rows]).tolist(), np.unique(self.readings.specimen[rows]).tolist()
 
     @property
     def _distance(self) -> Array:

@@ -10,9 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from ufl import conditional, lt
-
 from ....inputs.parameters import Parameter
+from ....mechanics.laws.shaped import shape_of
 from ...inference.effects import Effect, Shape, Values, of_run, of_specimen
 from .term import X, Y, strip_effect, turned
 from .variant import StripVariant
@@ -47,14 +46,15 @@ def own_terms(runs: Sequence[int], specimens: Sequence[int]) -> Iterator[Effect]
         return
     name = "reading_of_distance_and_run"
     turn = Parameter(f"{name}_turn_rad", amplitude=True)
-    seen = partial(_turned_by, turn.name)
-    forms = _each_specimen("turned", turn, specimens, "turn_rad", camera=seen)
+    forms = _each_specimen(
+        "turned", turn, specimens, "turn_rad", camera=lambda p, at: turned(p[turn.name], at)
+    )
     about = "a turn of the camera for each specimen"
     yield strip_effect(name, about, "reading", ("distance", "run"), forms)
     name = "rest_curvature_of_run"
     bent = Parameter(f"{name}_0_1_mm", amplitude=True)
-    at_rest = partial(_value_of, bent.name)
-    forms = _each_specimen("even", bent, specimens, Y["rest_curvature"], added_curvature=at_rest)
+    y = Y["rest_curvature"]
+    forms = _each_specimen("even", bent, specimens, y, added_curvature=lambda p, at: p[bent.name])
     about = "curvature of the unloaded strip that is each specimen's own"
     yield strip_effect(name, about, "rest_curvature", ("run",), forms)
 
@@ -73,21 +73,13 @@ def _each_specimen(
 
 def _each(own: Sequence[Parameter], of: str, y: str) -> tuple[tuple[Parameter, ...], Shape]:
     """The parameters of runs or specimens, and their values over these as a shape."""
-    numbers = {p.name: 1.0 + (p.run or p.specimen or 0) for p in own}
-    last = max(numbers.values())
-    points = tuple(number / last for number in numbers.values())
-    return tuple(own), Shape(of, y, last, partial(_of_its_own, numbers, last), points=points)
+    names = {1 + (p.run or p.specimen or 0): p.name for p in own}
+    last = max(names)
+    points = tuple(number / last for number in names)
+    return tuple(own), Shape(of, y, last, partial(_of_its_own, names, last), points=points)
 
 
-def _of_its_own(numbers: Mapping[str, float], last: float, p: Values, x: Any) -> Any:
+def _of_its_own(names: Mapping[int, str], last: int, p: Values, x: Any) -> Any:
     """What the run or specimen has that has the number x times the last one's, counted from 1."""
-    own = ((number, p[name]) for name, number in numbers.items())
-    return sum(conditional(lt(abs(x * last - number), 0.5), one, 0.0) for number, one in own)
-
-
-def _turned_by(turn: str, p: Values, at: Values) -> tuple[Any, Any]:
-    return turned(p[turn], at)
-
-
-def _value_of(name: str, p: Values, at: Values) -> Any:
-    return p[name]
+    each = tuple(p[names[k]] if k in names else 0.0 for k in range(1, last + 1))
+    return shape_of("each", each, (x * last - 1) / (last - 1))

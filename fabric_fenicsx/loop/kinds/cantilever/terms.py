@@ -171,7 +171,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
             added_moment=partial(_flexible, g, end, longest),
         )
         for end in ENDS
-        for label, parameters, g in _stiffnesses(name, end)
+        for label, parameters, g in _drawn_along(name, end)
     ]
     about = "bending stiffness that varies along the strip"
     yield strip_effect(name, about, "bending_moment", ("arc_length",), forms)
@@ -201,10 +201,6 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         for end, depends_on in ENDS.items():
             name = f"{acts_on}_of_{'_and_'.join(depends_on)}"
             most = LARGEST if constant else HEAVIEST
-            drawn = [*along_the_strip(name, end, constant=constant, most=most)]
-            if end == "clamp":
-                drawn += [two_places(name), wave(name, constant=constant)]
-                drawn += [wave(name, OVERTONES)] if constant else []
             forms = [
                 strip_form(
                     _from(label, end),
@@ -213,7 +209,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
                     acts_on,
                     partial(_of_place, unit, g, end, longest),
                 )
-                for label, parameters, g in drawn
+                for label, parameters, g in _drawn_along(name, end, constant=constant, most=most)
             ]
             words = f"{about} that varies along the strip"
             yield strip_effect(name, words, acts_on, depends_on, forms)
@@ -225,12 +221,16 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         yield strip_effect(name, f"{about} that goes by the overhang", acts_on, ("length",), forms)
 
 
-def _stiffnesses(name: str, end: str) -> Iterator[Drawn]:
-    """Shapes of a log-flexibility, at two places or in waves as well, as of binder by the pitch."""
-    yield from along_the_strip(name, end)
+def _drawn_along(
+    name: str, end: str, *, constant: bool = False, most: float = LARGEST
+) -> Iterator[Drawn]:
+    """Shapes over a place that is counted from one end; from the clamp two places and waves too."""
+    yield from along_the_strip(name, end, constant=constant, most=most)
     if end == "clamp":
         yield two_places(name)
-        yield wave(name, constant=False)
+        yield wave(name, constant=constant)
+        if constant:
+            yield wave(name, OVERTONES)
 
 
 def _centred(g: Of, end: str, p: Values, x: Any) -> Any:
