@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from linear import Linear, covariance, drawn, readings
 from scipy.interpolate import BSpline
+from scipy.optimize import OptimizeResult
 from scipy.stats import multivariate_normal
 
+from fabric_fenicsx.loop.inference import variances
 from fabric_fenicsx.loop.inference.criteria import CRITERIA
 from fabric_fenicsx.loop.inference.fitting import fit, linearised
 from fabric_fenicsx.loop.inference.noise import Noise
@@ -203,6 +205,20 @@ def test_the_likeliest_components_are_found_from_far_off(seed):
     far, close = (estimate(at, start, usual_scatter=np.inf) for start in (START, near))
     assert far.restricted == pytest.approx(close.restricted, abs=2.0)
     assert far.variances.noise.correlation == pytest.approx(NOISE.correlation, abs=0.2)
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-3])
+def test_the_search_ends_where_likelihoods_are_round_off(step, monkeypatch):
+    """A line search that fails returns where it began, and the value of where it was last.
+
+    With a force of 4e7 N and a noise of 2e-8 N that value was -2e20, each time again.
+    """
+
+    def failing(_, x, **options):
+        return OptimizeResult(x=x + step, fun=-2e20)
+
+    monkeypatch.setattr(variances, "minimize", failing)
+    assert estimate(example(), Variances(NOISE)).variances.noise.floor > 0.0
 
 
 def test_columns_that_are_alike_and_huge_have_a_likelihood():

@@ -213,6 +213,7 @@ CASES: list[Bad] = [
     _keys("noise_key_unknown", "noise force_kN", _set("noise", to={"force_kN": 1e-5})),
     _keys("noise_of_another_test", "noise z_mm", _set("noise", to={"z_mm": 0.1})),
     _keys("noise_negative", "force_N", _set("noise", "force_N", to=-0.02)),
+    _keys("noise_of_round_off", "force_N", _set("noise", "force_N", to=1e-12)),
     _keys("noise_is_a_number", "noise", _set("noise", to=0.02)),
     _keys("role_unknown", "role train holdout", _set("runs", 1, "role", to="train")),
     _keys("role_missing", "role", _drop("runs", 1, "role")),

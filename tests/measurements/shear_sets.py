@@ -36,6 +36,8 @@ SHOWN_BY = {
     "vibration": ("cycle", "load_hold"),
     "run_to_run": ("monotone", "cycle"),
 }
+# One sigma of the finest load cell, over the force of the baseline.
+FINEST = 1e-5
 FORM_NEEDS = {("crosshead_backlash", "free"): ("monotone", "cycle", "load_hold_unload")}
 
 
@@ -139,7 +141,15 @@ def scales(test: Experiment) -> Scales:
     return Scales(0.5 * moment, rms, angle, rate, travel, min(durations), len(durations))
 
 
-def shear_set(
+def shear_set(rng: np.random.Generator, name: str, **options) -> Measurement:
+    """A picture-frame set; see `_drawn`. Programmes are drawn until one shows the effect."""
+    drawn = None
+    while drawn is None:
+        drawn = _drawn(rng, name, **options)
+    return drawn
+
+
+def _drawn(
     rng: np.random.Generator,
     name: str,
     effects: tuple[tuple[str, str], ...] = (),
@@ -152,8 +162,8 @@ def shear_set(
     growing_noise: bool = False,
     acceptable: list[frozenset[str]] | None = None,
     **layout,
-) -> Measurement:
-    """A picture-frame set with effects given as (name, form), or an unlisted one."""
+) -> Measurement | None:
+    """A set with effects given as (name, form), or an unlisted one; None where nothing shows."""
     if kind is None:
         first = effects[0] if effects else (unlisted or "", "")
         choice = FORM_NEEDS.get(first) or SHOWN_BY.get(first[0]) or SHOWN_BY.get(unlisted or "")
@@ -176,6 +186,9 @@ def shear_set(
     if built and reached < 1:
         # An effect at its largest sensible size: a better load cell shows it.
         sigma = float(f"{sigma * reached / ratio:.2g}")
+        if sigma < FINEST * size.force:
+            # No load cell does: this programme hides the effect.
+            return None
         reached = unabsorbed(test) / sigma
 
     runs = []

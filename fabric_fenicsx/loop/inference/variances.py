@@ -46,6 +46,8 @@ SMALL_SCATTER = 0.03
 ENOUGH = 1e-7
 #: ... in all, beyond which that step, which is a share of it, was not yet a small one.
 FAR = 100.0
+#: Times that the search begins anew from where a step was far.
+RESTARTS = 20
 #: Values of a scatter that are tried.
 TRIED = 21
 #: Largest correlation of neighbours; of a single run slower noise is not told from a misfit.
@@ -147,13 +149,15 @@ def estimate(
     options = {"maxiter": 60, "ftol": ENOUGH}
 
     def likeliest(x: Array) -> Array:
-        gain = np.inf
-        while gain > FAR:
+        for _ in range(RESTARTS):
             problem.origin = problem.cost(x)[problem.of]
             found = minimize(
                 problem.with_slope, x, method="L-BFGS-B", jac=True, bounds=bounds, options=options
             )
-            x, gain = np.asarray(found.x), -found.fun
+            # A gain without a step is round-off.
+            if -found.fun <= FAR or np.array_equal(found.x, x):
+                return np.asarray(found.x)
+            x = np.asarray(found.x)
         return x
 
     def alike(x: Array) -> Array:

@@ -25,6 +25,8 @@ Array = npt.NDArray[np.float64]
 
 #: Keys of an entry of ``runs`` that every kind has.
 COMMON = RunKeys.model_fields
+#: Least noise that can be meant, as a share of the largest reading: round-off is not far below.
+LEAST_NOISE = 1e-9
 #: Decimals of columns that are not compared.
 DECIMALS = {"time_s": 6, "displacement_mm": 6}
 
@@ -61,6 +63,12 @@ def read_folder(folder: Path, kinds: Sequence[Kind]) -> Measurement:
         holdout = entry.role == "holdout"
         runs.append(Run(entry.file, holdout, entry.label, columns, entry.specimen, own))
     noise = getattr(keys.noise, kind.quantity)
+    largest = max(float(np.nanmax(np.abs(run.columns[kind.quantity]))) for run in runs)
+    if noise is not None and noise < LEAST_NOISE * largest:
+        raise InputError(
+            f"{path}: noise.{kind.quantity}: {noise:g} beside readings of up to {largest:g}, "
+            f"allowed is {LEAST_NOISE * largest:.2g} or more"
+        )
     sigmas = {name: getattr(keys.noise, name) for name in kind.besides}
     return Measurement(
         folder,
