@@ -8,7 +8,7 @@ from typing import Any
 
 from .errors import InputError, SolveError
 
-__all__ = ["from_root", "launched", "neighbour", "rank", "world"]
+__all__ = ["cores", "from_root", "launched", "neighbour", "rank", "world"]
 
 NAMES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 
@@ -32,6 +32,14 @@ stays; a list of what is not to be used (``^tcp``) names nothing."""
 def launched() -> bool:
     """Whether mpirun has started this process."""
     return any(name in os.environ for name in NAMES)
+
+
+def cores() -> int:
+    """Processes that work may be shared by: one beside mpirun, whose ranks have the cores."""
+    if launched():
+        return 1
+    able = getattr(os, "sched_getaffinity", None)
+    return len(able(0)) if able is not None else os.cpu_count() or 1
 
 
 def rank() -> int:

@@ -54,6 +54,7 @@ class Linear:
 
     test, quantity, notes, one_curve = "linear", "force_N", (), None
     curves_only = each_its_own_way = False
+    in_copies = True
     alike = frozenset()
     imitated = MappingProxyType({})
 

@@ -147,7 +147,7 @@ def test_a_way_out_is_had_without_the_way_back(monkeypatch):
 def test_processes_find_what_one_finds(monkeypatch):
     tasks = [(case(length=length), curve) for length in (50.0, 40.0) for curve in (SOFT, STIFF)]
     alone = [solved_strip(*task) for task in tasks]
-    monkeypatch.setattr(workers, "_cores", lambda: 2)
+    monkeypatch.setattr(workers, "cores", lambda: 2)
     together = workers.each_of(solved_strip, [*tasks, (hasty(case()), SOFT)])
     assert all(same(a, b) for a, b in zip(alone, together[:-1], strict=True))
     assert isinstance(together[-1], SolveError)
@@ -166,7 +166,7 @@ def test_beside_mpirun_there_are_none(monkeypatch):
 ASKS = """
 import os, sys, time
 from fabric_fenicsx.loop import workers
-workers._cores = lambda: 2
+workers.cores = lambda: 2
 found = workers.each_of(os.getpid, [()] * 2 + [()] * 20)
 print(*[worker.process.pid for worker in workers._workers], flush=True)
 workers.each_of(time.sleep, [(3.0,)] * 4)

@@ -19,7 +19,7 @@ from time import monotonic
 from typing import Any
 
 from ..errors import SolveError
-from ..parallel import launched, world
+from ..parallel import cores, world
 
 __all__ = ["each_of", "serve"]
 
@@ -58,7 +58,7 @@ def each_of(function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> l
     Raises:
         SolveError: a process has ended before it was done, for want of memory perhaps.
     """
-    count = min(_cores(), len(tasks))
+    count = min(cores(), len(tasks))
     if count < 2:
         return [_done(function, task) for task in tasks]
     try:
@@ -112,14 +112,6 @@ def _done(function: Callable[..., Any], task: tuple[Any, ...]) -> Any:
         return function(*task)
     except Exception as error:
         return error
-
-
-def _cores() -> int:
-    """Workers that there may be: none beside mpirun, whose ranks have the cores."""
-    if launched():
-        return 1
-    able = getattr(os, "sched_getaffinity", None)
-    return len(able(0)) if able is not None else os.cpu_count() or 1
 
 
 @atexit.register

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from ..copies import in_copies
 from .effects import Effect, Parameter, Variant
 
 __all__ = [
@@ -21,8 +22,11 @@ __all__ = [
     "OneCurve",
     "Readings",
     "deviated",
+    "each_by_itself",
 ]
 
+T = TypeVar("T")
+R = TypeVar("R")
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Numbers = npt.NDArray[np.int64]
@@ -214,6 +218,11 @@ class Experiment(Protocol):
         ...
 
     @property
+    def in_copies(self) -> bool:
+        """Whether copies of the process may predict: there is no MPI and no PETSc in it."""
+        ...
+
+    @property
     def imitated(self) -> Mapping[str, Sequence[str]]:
         """Names of terms that do nearly what a candidate does, tried beside it, by its name."""
         ...
@@ -275,3 +284,18 @@ class Experiment(Protocol):
             SolveError: the model has no solution there.
         """
         ...
+
+
+def each_by_itself(
+    experiment: Experiment,
+    function: Callable[[T], R],
+    tasks: Sequence[T],
+    known: Iterable[object] = (),
+) -> list[R]:
+    """What a function of a test returns of each task, by copies of the process where it may be.
+
+    What is given is as for ``in_copies``.
+    """
+    if experiment.in_copies:
+        return in_copies(function, tasks, known)
+    return [function(task) for task in tasks]

@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Effect, Variant
-from .experiment import Experiment
+from .experiment import Experiment, each_by_itself
 from .fitting import Fit, fit, parameters_of
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise
@@ -169,12 +169,14 @@ class Models:
         order = sorted(range(len(found)), key=lambda k: (nothing_left(found[k]), first[k]))
         sets = [frozenset(own) for own in effects]
         seen: list[frozenset[Effect]] = []
-        models = []
+        taken: list[tuple[Fit, tuple[Effect, ...]]] = []
         for rank, k in enumerate(order):
             near = rank < MOST_NEAR and first[k] < first[order[0]] + CRITERIA.decisive
             if near or seen.count(sets[k]) < OF_A_SET:
                 seen.append(sets[k])
-                models.append(self.judge.weighed(found[k], effects[k]))
+                taken.append((found[k], effects[k]))
+        known = [one for model, own in taken for one in (model, *own)]
+        models = each_by_itself(self.experiment, lambda one: self.judge.weighed(*one), taken, known)
         return sorted(models, key=lambda m: m.criterion)
 
     def refined(self, model: Model) -> Model:

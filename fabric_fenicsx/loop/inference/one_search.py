@@ -20,7 +20,7 @@ from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis
 from .effects import Effect, Variant
-from .experiment import Experiment
+from .experiment import Experiment, each_by_itself
 from .fitting import Fit, fit
 from .judge import Model
 from .models import Models, nothing_left
@@ -319,14 +319,24 @@ class Search:
 
     def _beside(self, model: Fit, effects: Sequence[Effect]) -> list[Combination]:
         """Every form of some effects, about a model."""
-        known = set(model.values)
-        alike = self.experiment.predict(model.variants, model.values)
-        return [
-            ((variant, shape),)
+        values = set(model.values)
+        expected, slopes = self.experiment.predict(model.variants, model.values)
+        forms = [
+            variant
             for effect in effects
             for variant in effect.variants
-            if known.isdisjoint(p.name for p in variant.parameters)
-            for shape in signatures(self.experiment, model, *alike, variant)
+            if values.isdisjoint(p.name for p in variant.parameters)
+        ]
+        every = each_by_itself(
+            self.experiment,
+            lambda variant: signatures(self.experiment, model, expected, slopes, variant),
+            forms,
+            [expected, *slopes.values()],
+        )
+        return [
+            ((variant, shape),)
+            for variant, shapes in zip(forms, every, strict=True)
+            for shape in shapes
         ]
 
     def _together(self, count: int, fewer: Fit) -> list[Model]:

@@ -161,20 +161,21 @@ class Screen:
             count: of sets of effects.
             effects: in each, two or more.
         """
-        chosen = self._ranked(self._sets(effects), count)
+        chosen = self._ranked(*self._sets(effects), count)
         return [tuple((g.variant, g.signature) for g in one) for one in chosen]
 
     def least_left(self, effects: int) -> float:
         """The least sum of squares, white, that any so many effects leave; two or more."""
-        gains = self._gains(self._sets(effects))
+        _, gains = self._sets(effects)
         return self._sum - float(gains.max(initial=0.0))
 
-    def _sets(self, effects: int) -> list[tuple[_Group, ...]]:
-        """All pairs, or what the best of them are with others."""
-        sets = self._pairs()
+    def _sets(self, effects: int) -> tuple[list[tuple[_Group, ...]], Array]:
+        """All pairs, or what the best of them are with others, and what each takes off."""
+        sets, gains = self._pairs()
         for _ in range(effects - 2):
-            sets = self._with_another(self._ranked(sets, BEST_PAIRS))
-        return sets
+            sets = self._with_another(self._ranked(sets, gains, BEST_PAIRS))
+            gains = self._gains(sets)
+        return sets, gains
 
     def instead(
         self, kept: Sequence[Variant], others: Sequence[Effect], count: int
@@ -190,10 +191,11 @@ class Screen:
         for variant in kept:
             own = [g for g in self._groups if g.variant is variant]
             sets = [(*one, g) for one in sets for g in own]
-        chosen = self._ranked([one for one in sets if _compatible(one)], count)
+        sets = [one for one in sets if _compatible(one)]
+        chosen = self._ranked(sets, self._gains(sets), count)
         return [tuple((g.variant, g.signature) for g in one) for one in chosen]
 
-    def _pairs(self) -> list[tuple[_Group, ...]]:
+    def _pairs(self) -> tuple[list[tuple[_Group, ...]], Array]:
         """Pairs of shapes: of all effects one of each form, of what then is the best more."""
         by_effect: dict[Effect, list[_Group]] = {}
         for k in np.argsort(-self._alone, kind="stable"):
@@ -202,11 +204,12 @@ class Screen:
                 own.append(self._groups[k])
         first = [[*{g.variant: g for g in reversed(own)}.values()] for own in by_effect.values()]
         found = _paired(combinations(first, 2))
-        best = self._ranked(found, MOST_PAIRS, forms=1)
+        gains = self._gains(found)
+        best = self._ranked(found, gains, MOST_PAIRS, forms=1)
         chosen = [tuple(by_effect[group.effect] for group in pair) for pair in best]
         tried = {tuple(id(group) for group in pair) for pair in found}
-        more = _paired(chosen)
-        return found + [pair for pair in more if tuple(id(g) for g in pair) not in tried]
+        more = [p for p in _paired(chosen) if tuple(id(g) for g in p) not in tried]
+        return found + more, np.concatenate([gains, self._gains(more)])
 
     def _with_another(self, sets: Sequence[tuple[_Group, ...]]) -> list[tuple[_Group, ...]]:
         found = [
@@ -218,16 +221,16 @@ class Screen:
         return [several for several in found if _compatible(several)]
 
     def _ranked(
-        self, sets: Sequence[tuple[_Group, ...]], count: int, forms: int = FORMS
+        self, sets: Sequence[tuple[_Group, ...]], gains: Array, count: int, forms: int = FORMS
     ) -> list[tuple[_Group, ...]]:
         """Of the best sets of effects the best combinations of forms, one shape each.
 
         Args:
             sets: of shapes.
+            gains: what each takes off the sum of squares.
             count: of sets of effects.
             forms: combinations of each.
         """
-        gains = self._gains(sets)
         cost = np.log(self._count) * np.array([sum(g.parameters for g in one) for one in sets])
         order = np.argsort(cost - gains)
         chosen: dict[frozenset[Effect], dict[frozenset[Variant], tuple[_Group, ...]]] = {}

@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Parameter, Variant
-from .experiment import Experiment
+from .experiment import Experiment, each_by_itself
 from .fitting import Fit, fit, linearised, orthogonal_to, parameters_of, soft_size
 from .variances import Variances
 
@@ -95,18 +95,15 @@ def fit_combinations(
     promising.sort(key=lambda one: one[1].left)
     if most is not None:
         promising = _of_so_many_kinds(promising, kinds, most)
-    fits: list[Fit] = []
-    followed: set[tuple[Variant, ...]] = set()
-    for forms, start in promising:
-        # To first order is not the last word: one start of each form is fitted, unless it is far
-        # off, and whatever is within a factor of the best.
-        limit = CRITERIA.second_start if forms in followed else CRITERIA.far_off
-        if start.left > limit * promising[0][1].left:
-            continue
-        followed.add(forms)
+    wanted = _worth_a_look(promising)
+    # A copy of the process returns them the same.
+    known = [base.readings, base.used, variances, *(v for forms, _ in wanted for v in forms)]
+
+    def looked_at(one: tuple[tuple[Variant, ...], _Start]) -> Fit | None:
+        forms, start = one
         try:
             at = _damped(experiment, base, forms, start, variances, robust)
-            found = fit(
+            return fit(
                 experiment,
                 forms,
                 at,
@@ -116,15 +113,38 @@ def fit_combinations(
                 robust=robust,
             )
         except SolveError:
-            continue
-        fits.append(found)
+            return None
+
+    def finished(found: Fit) -> Fit:
+        if not found.converged:
+            found = _again(experiment, found, found.values, evaluations, robust)
+        return around_jumps(experiment, found, evaluations, robust)
+
+    looks = each_by_itself(experiment, looked_at, wanted, known)
+    fits = [found for found in looks if found is not None]
     sizes = [f.size(robust) for f in fits]
-    for k, found in enumerate(fits):
-        if sizes[k] <= CRITERIA.worthwhile * min(sizes):
-            if not found.converged:
-                found = _again(experiment, found, found.values, evaluations, robust)
-            fits[k] = around_jumps(experiment, found, evaluations, robust)
+    on = [k for k, size in enumerate(sizes) if size <= CRITERIA.worthwhile * min(sizes)]
+    ends = each_by_itself(experiment, finished, [fits[k] for k in on], [*known, *fits])
+    for k, found in zip(on, ends, strict=True):
+        fits[k] = found
     return fits
+
+
+def _worth_a_look(
+    promising: Sequence[tuple[tuple[Variant, ...], _Start]],
+) -> list[tuple[tuple[Variant, ...], _Start]]:
+    """To first order is not the last word: one start of each form, unless it is far off.
+
+    And whatever is within a factor of the best, which comes first.
+    """
+    followed: set[tuple[Variant, ...]] = set()
+    kept = []
+    for forms, start in promising:
+        limit = CRITERIA.second_start if forms in followed else CRITERIA.far_off
+        if start.left <= limit * promising[0][1].left:
+            followed.add(forms)
+            kept.append((forms, start))
+    return kept
 
 
 def _of_so_many_kinds(

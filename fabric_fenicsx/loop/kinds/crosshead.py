@@ -62,6 +62,7 @@ class CrossheadTest:
     quantity = "force_N"
     notes: Sequence[str] = ()
     terms_are_rivals = False
+    in_copies = True
     each_its_own_way = False
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType({})
     alike: frozenset[str] = frozenset()

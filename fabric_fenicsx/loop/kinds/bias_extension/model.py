@@ -81,6 +81,8 @@ class BiasExtension(CrossheadTest):
     curves_only = False
     # Each of its readings is of crossings at many angles: laws of other variables look more alike.
     terms_are_rivals = True
+    # The strip is solved as a whole.
+    in_copies = False
 
     def __init__(
         self,

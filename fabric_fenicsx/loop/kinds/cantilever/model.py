@@ -112,6 +112,7 @@ class Cantilever:
     one_curve = None
     curves_only = False
     terms_are_rivals = False
+    in_copies = True
     # A camera that is turned sees a strip that is tilted, but for how that bends.
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType(
         {"clamp_tilt": ("reading_of_distance",)}

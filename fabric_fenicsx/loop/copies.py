@@ -1,0 +1,137 @@
+"""Work that does not wait for other work, shared with copies of this process.
+
+A copy (fork) knows all that is known here, compiled expressions and functions of functions, which a
+process of its own would have to be told. It ends when its share is done, and what it has learnt by
+then is lost with it but for what it returns. Nothing that needs MPI or PETSc is done in one.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from typing import Any, BinaryIO, TypeVar
+
+from ..errors import SolveError
+from ..parallel import cores
+
+__all__ = ["in_copies"]
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+def in_copies(
+    function: Callable[[T], R], tasks: Sequence[T], known: Iterable[object] = ()
+) -> list[R]:
+    """What a function returns of each task.
+
+    Every so many-th task is this process's, the next one the first copy's, and so on: the same ones
+    each time.
+
+    Args:
+        function: of a task; what it returns can be pickled, but for what is known.
+        tasks: its arguments.
+        known: objects that may be in what it returns and stay the very same.
+
+    Raises:
+        SolveError: a copy has ended before it was done, for want of memory perhaps.
+        Exception: what the function raised of a task.
+    """
+    count = min(cores(), len(tasks))
+    if count < 2:
+        return [function(task) for task in tasks]
+    shared = list(known)
+    found: list[Any] = [None] * len(tasks)
+    copies: list[_Copy] = []
+    try:
+        for k in range(1, count):
+            copies.append(_Copy(function, tasks[k::count], shared))
+        found[::count] = [function(task) for task in tasks[::count]]
+        for k, copy in enumerate(copies, 1):
+            found[k::count] = copy.answers(shared)
+    finally:
+        for copy in copies:
+            copy.end()
+    return found
+
+
+class _Copy:
+    """A copy of the process that is at work, and the way from it."""
+
+    def __init__(
+        self, function: Callable[[T], Any], tasks: Sequence[T], shared: Sequence[object]
+    ) -> None:
+        ours, theirs = os.pipe()
+        with warnings.catch_warnings():
+            # Threads that draw a progress bar hold nothing that a copy needs.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self._process = os.fork()
+        if self._process == 0:
+            # No handler, buffer or exit function of the process that it is a copy of may run.
+            try:
+                os.close(ours)
+                signal.signal(signal.SIGINT, signal.SIG_DFL)
+                signal.signal(signal.SIGTERM, signal.SIG_DFL)
+                with os.fdopen(theirs, "wb") as stream:
+                    _work(function, tasks, shared, stream)
+            finally:
+                os._exit(0)
+        os.close(theirs)
+        self._answers = os.fdopen(ours, "rb")
+
+    def answers(self, shared: Sequence[object]) -> list[Any]:
+        """Of its tasks."""
+        try:
+            found, error = _Reader(self._answers, shared).load()
+        except (EOFError, pickle.UnpicklingError):
+            raise SolveError("a copy of the process that was at work has ended") from None
+        if error is not None:
+            raise error
+        return list(found)
+
+    def end(self) -> None:
+        """It is not waited for any more."""
+        self._answers.close()
+        with suppress(ProcessLookupError):
+            os.kill(self._process, signal.SIGKILL)
+        with suppress(ChildProcessError):
+            os.waitpid(self._process, 0)
+
+
+def _work(
+    function: Callable[[T], Any], tasks: Sequence[T], shared: Sequence[object], stream: BinaryIO
+) -> None:
+    """Write what a function returns of tasks, or the exception that it raised."""
+    found: list[Any] | None = None
+    error: Exception | None = None
+    try:
+        found = [function(task) for task in tasks]
+    except Exception as raised:
+        error = raised
+    _Writer(stream, shared).dump((found, error))
+
+
+class _Writer(pickle.Pickler):
+    """Writes objects that both sides know by their number."""
+
+    def __init__(self, stream: BinaryIO, shared: Sequence[object]) -> None:
+        super().__init__(stream, protocol=pickle.HIGHEST_PROTOCOL)
+        self._numbers = {id(one): k for k, one in enumerate(shared)}
+
+    def persistent_id(self, obj: Any) -> int | None:
+        return self._numbers.get(id(obj))
+
+
+class _Reader(pickle.Unpickler):
+    """Reads them."""
+
+    def __init__(self, stream: BinaryIO, shared: Sequence[object]) -> None:
+        super().__init__(stream)
+        self._shared = shared
+
+    def persistent_load(self, pid: Any) -> Any:
+        return self._shared[pid]

@@ -1,0 +1,114 @@
+"""Work that is shared with copies of the process: the same answers, the same objects, no trace."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+from linear import Linear, readings
+
+from fabric_fenicsx.errors import SolveError
+from fabric_fenicsx.loop import copies
+from fabric_fenicsx.loop.copies import in_copies
+from fabric_fenicsx.loop.inference.effects import Effect, Parameter, Variant
+from fabric_fenicsx.loop.inference.search import diagnose_test
+
+
+@pytest.fixture(autouse=True)
+def three_cores(monkeypatch):
+    monkeypatch.setattr(copies, "cores", lambda: 3)
+
+
+def no_child_left():
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+def test_answers_come_in_the_order_of_the_tasks_from_as_many_processes_as_cores():
+    own = os.getpid()
+    found = in_copies(lambda k: (k**2, os.getpid()), range(8))
+    assert [square for square, _ in found] == [k**2 for k in range(8)]
+    pids = [pid for _, pid in found]
+    assert pids[::3] == [own] * 3
+    assert len(set(pids)) == 3 and pids[1] == pids[4] and pids[2] == pids[5]
+    no_child_left()
+
+
+def test_one_task_or_one_core_needs_no_copy(monkeypatch):
+    assert in_copies(lambda _: os.getpid(), [0]) == [os.getpid()]
+    monkeypatch.setattr(copies, "cores", lambda: 1)
+    assert in_copies(lambda _: os.getpid(), range(5)) == [os.getpid()] * 5
+    assert in_copies(lambda _: os.getpid(), []) == []
+
+
+def test_known_objects_stay_the_very_same():
+    def law():
+        """No pickle holds what is defined in a function."""
+
+    other = object()
+    found = in_copies(lambda k: (k, [law, other]), range(3), [law, other])
+    assert all(one is law and two is other for _, (one, two) in found)
+
+
+def test_a_large_answer_fits_through():
+    assert in_copies(lambda k: bytes([k]) * 10**7, range(3))[2] == b"\2" * 10**7
+
+
+@pytest.mark.parametrize("where", [0, 1])
+def test_what_is_raised_of_a_task_is_raised_here(where):
+    def strict(k):
+        if k == where:
+            raise SolveError(f"task {k}")
+        return k
+
+    with pytest.raises(SolveError, match=f"task {where}"):
+        in_copies(strict, range(6))
+    no_child_left()
+
+
+def test_a_copy_that_is_killed_is_an_error_and_no_answer():
+    own = os.getpid()
+
+    def mortal(k):
+        if os.getpid() != own:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return k
+
+    with pytest.raises(SolveError, match="has ended"):
+        in_copies(mortal, range(3))
+    no_child_left()
+
+
+def test_an_interrupt_ends_the_copies():
+    own = os.getpid()
+
+    def slow(_):
+        if os.getpid() == own:
+            raise KeyboardInterrupt
+        signal.pause()
+
+    with pytest.raises(KeyboardInterrupt):
+        in_copies(slow, range(3))
+    no_child_left()
+
+
+def test_a_diagnosis_is_the_same_to_the_last_digit_however_many_share_it(monkeypatch):
+    t = np.tile(np.linspace(0.0, 1.0, 60), 3)
+    columns = {"a": np.ones_like(t), "b": t, **{f"c{k}": np.sin(k * t) for k in range(2, 9)}}
+    clean = 1.0 + 2.0 * t + columns["c3"] - columns["c7"]
+    observed = clean + 0.01 * np.random.default_rng(4).normal(size=len(t))
+    test = Linear(readings(observed, run=np.repeat(np.arange(3), 60)), columns, ("a", "b"))
+    own = {f"c{k}": (Parameter(f"c{k}", amplitude=True),) for k in range(2, 9)}
+    test.effects = [
+        Effect(name, "linear", "", (Variant("only", parameters),))
+        for name, parameters in own.items()
+    ]
+    test.terms, test.terms_are_rivals = (), False
+    found = []
+    for count in (3, 1):
+        monkeypatch.setattr(copies, "cores", lambda count=count: count)
+        found.append(diagnose_test(test))
+    assert {e.name for e in found[0].effects} == {"c3", "c7"}
+    assert found[0].criterion_after == found[1].criterion_after
+    assert found[0].final.values == found[1].final.values
+    assert [c.criterion for c in found[0].candidates] == [c.criterion for c in found[1].candidates]
