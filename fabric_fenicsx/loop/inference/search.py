@@ -12,6 +12,7 @@ they are not.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from .criteria import CRITERIA
 from .diagnosis import Diagnosis
@@ -43,7 +44,6 @@ def diagnose_test(
     """
     listed = [e for e in experiment.effects if names is None or e.name in names]
     search = Search(experiment, listed, progress)
-    terms = [term for term in experiment.terms if not term.of_two]
     if names is not None or not experiment.terms:
         return search.run()
     further = Search(experiment, [*listed, *experiment.terms], progress, most=1)
@@ -58,27 +58,68 @@ def diagnose_test(
     if not search.accounted:
         further.most = None
         return _beside(further.run(), found)
-    chosen = search.chosen
+    doubt = _doubt(search)
+    return found if doubt is None else _against_a_term(search, found, further, doubt, progress)
+
+
+@dataclass(frozen=True, slots=True)
+class _Doubt:
+    """What speaks for looking at terms although effects with names account for the readings.
+
+    Attributes:
+        terms: to try by themselves.
+        least: that one must gain over the effects in the criterion to take their place.
+        rivals: whether others are named as rivals of a single effect.
+    """
+
+    terms: Sequence[Effect]
+    least: float
+    rivals: bool
+
+
+def _doubt(search: Search) -> _Doubt | None:
+    """Of what a search for effects with names has chosen; None where there is none."""
+    chosen, experiment = search.chosen, search.experiment
     assert chosen is not None
     own = [effect.name for effect in chosen.effects]
     alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
     in_its_way = experiment.each_its_own_way and search.specimens_differ
     doubtful = in_its_way or _at_the_edge(chosen.fit) or search.judge.uneven(chosen.fit)
     rivals = bool(own) and (experiment.terms_are_rivals or doubtful)
+    single = [term for term in experiment.terms if not term.of_two]
     if len(own) > 1:
         # Several effects with names may imitate a single one that has none.
-        least = -CRITERIA.decisive
-    elif search.doubtful_noise or rivals:
+        return _Doubt(single, -CRITERIA.decisive, False)
+    if search.doubtful_noise or rivals:
         # Before noise is said to be more than was stated, or as slow as a misfit, terms are tried.
         terms = [t for t in experiment.terms if not set(own) & set(t.general_form_of)]
-        least = CRITERIA.decisive
-    elif alike:
-        terms, least = [t for t in terms if t.name in alike], CRITERIA.decisive
-    else:
-        return found
-    single, other = further, further.found
-    if len(own) < 2 or other is None:
-        single = Search(experiment, terms, progress, most=1)
+        return _Doubt(terms, CRITERIA.decisive, rivals or bool(alike))
+    if alike:
+        return _Doubt([t for t in single if t.name in alike], CRITERIA.decisive, True)
+    return None
+
+
+def _against_a_term(
+    search: Search,
+    found: Diagnosis,
+    further: Search,
+    doubt: _Doubt,
+    progress: Callable[[float, str], None],
+) -> Diagnosis:
+    """The diagnosis that stands when terms have been tried as well.
+
+    Args:
+        search: of the effects with a name.
+        found: its diagnosis.
+        further: a search of these and all terms.
+        doubt: what speaks for it.
+        progress: see diagnose_test.
+    """
+    chosen = search.chosen
+    assert chosen is not None
+    single, other, least = further, further.found, doubt.least
+    if len(chosen.effects) < 2 or other is None:
+        single = Search(search.experiment, doubt.terms, progress, most=1)
         other = single.run()
     search.judge.compared = True
     final = search.judge.weighed(chosen.fit, chosen.effects)
@@ -87,38 +128,57 @@ def diagnose_test(
         # It may stand for another law as well as they.
         least = CRITERIA.decisive
     one = other.effects[0] if len(other.effects) == 1 else None
-    alone = single.accounted and one is not None and not one.listed
-    if alone and gain > least:
-        if gain < CRITERIA.decisive:
-            for names_of in other.rivals.values():
-                names_of += [effect.name for effect in found.effects]
-        elif len(found.effects) == 1:
-            _name(single, other, other.effects[0], search, found.effects[0])
-        if single.doubtful_noise:
-            several = _several(further, other.criterion_after)
+    if single.accounted and one is not None and not one.listed:
+        if gain > least:
+            return _in_their_place(search, found, further, single, gain)
+        if len(found.effects) > 1 and abs(gain) < CRITERIA.decisive:
+            _rival_of_all(search, found, final, single, other)
+    if not chosen.effects:
+        preferred = single.chosen
+        if single.accounted and preferred is not None and preferred.effects:
+            if final.criterion - preferred.criterion > CRITERIA.decisive:
+                # Held-out runs contradict it, which does not make a misfit noise.
+                return _beside(other, found)
+    else:
+        nearest = min((m.criterion for m in single.singles), default=float("inf"))
+        if not single.accounted and nearest < final.criterion - CRITERIA.decisive:
+            # What is beaten so is not it, whether or not what beats it is all that there is.
+            further.most = None
+            return _beside(further.run(), found)
+        if search.judge.slow_noise(final):
+            # As slow as a misfit: what several terms explain instead is not said to be noise.
+            several = _several(further, final.criterion)
             if several is not None:
                 return _beside(several, found)
-        return _beside(other, found)
-    if alone and len(found.effects) > 1 and abs(gain) < CRITERIA.decisive:
-        _rival_of_all(search, found, final, single, other)
-    preferred = single.chosen
-    if not own and single.accounted and preferred is not None and preferred.effects:
-        if final.criterion - preferred.criterion > CRITERIA.decisive:
-            # Held-out runs contradict it, which does not make a misfit noise.
-            return _beside(other, found)
-    nearest = min((m.criterion for m in single.singles), default=float("inf"))
-    if own and not single.accounted and nearest < final.criterion - CRITERIA.decisive:
-        # What is beaten so is not it, whether or not what beats it is all that there is.
-        further.most = None
-        return _beside(further.run(), found)
-    if own and search.judge.slow_noise(final):
-        # As slow as a misfit: what several terms explain instead is not said to be noise.
-        several = _several(further, final.criterion)
-        if several is not None:
-            return _beside(several, found)
-    if len(found.effects) == 1 and (rivals or alike):
+    if len(found.effects) == 1 and doubt.rivals:
         _name_terms(search, found, final, single, other)
     return found
+
+
+def _in_their_place(
+    search: Search, found: Diagnosis, further: Search, single: Search, gain: float
+) -> Diagnosis:
+    """A single term's diagnosis, which explains more than effects with names do.
+
+    Args:
+        search: of the effects with a name.
+        found: its diagnosis.
+        further: a search of these and all terms.
+        single: the search that found the term.
+        gain: of the term over them in the criterion.
+    """
+    other = single.found
+    assert other is not None
+    if gain < CRITERIA.decisive:
+        for names_of in other.rivals.values():
+            names_of += [effect.name for effect in found.effects]
+    elif len(found.effects) == 1:
+        _name(single, other, other.effects[0], search, found.effects[0])
+    if single.doubtful_noise:
+        several = _several(further, other.criterion_after)
+        if several is not None:
+            return _beside(several, found)
+    return _beside(other, found)
 
 
 def _several(further: Search, criterion: float) -> Diagnosis | None:
