@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from linear import Linear, readings
+from scipy.signal import lfilter
 
 from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
@@ -159,6 +160,34 @@ def test_what_two_terms_explain_is_not_a_name_with_slow_noise(truth, found):
     test.terms = [effect("wave", "moment"), effect("step", "reading")]
     test.terms_are_rivals = test.each_its_own_way = False
     assert {e.name for e in diagnose_test(test).effects} == found
+
+
+@pytest.mark.parametrize(("held", "verdict"), [(1.0, "effect_discovered"), (-1.0, "unexplained")])
+def test_a_misfit_that_held_out_runs_contradict_is_not_noise(held, verdict):
+    """The same rough line in each run that is fitted, in the one held out once the other way up.
+
+    Without the term it is noise whose neighbours correlate by 0.9, and looks like no effect.
+    """
+    rng = np.random.default_rng(5)
+    t = np.tile(np.linspace(0.0, 1.0, 120), 4)
+    run = np.repeat(np.arange(4), 120)
+    rough = lfilter([1.0], [1.0, -0.93], rng.normal(size=120))
+    columns = {"a": np.ones_like(t), "b": t, "rough": np.tile(rough, 4)}
+    columns["kink"] = np.maximum(t - 0.9, 0.0)
+    seen = 0.2 * np.where(run == 3, held, 1.0) * columns["rough"]
+    observed = 100.0 + 2.0 * t + seen + 0.03 * rng.normal(size=len(t))
+    test = Linear(readings(observed, run=run, holdout=(3,)), columns, ("a", "b"))
+
+    def effect(name, acts_on):
+        own = (Parameter(name, amplitude=True),)
+        return Effect(name, "linear", "", (Variant("only", own),), acts_on=acts_on)
+
+    test.effects, test.terms = [effect("kink", "")], [effect("rough", "moment")]
+    test.terms_are_rivals = test.each_its_own_way = False
+    assert diagnose_test(test, ["kink"]).verdict == "no_effect"
+    found = diagnose_test(test)
+    assert found.verdict == verdict
+    assert [e.name for e in found.effects] == ["rough"] * (held > 0.0)
 
 
 def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None):
