@@ -41,6 +41,7 @@ from .loop.diagnose import Found as Found
 from .loop.diagnose import diagnose as diagnose
 from .loop.diagnose import read_measurement as read_measurement
 from .loop.inference.effects import Effect as Effect
+from .loop.kinds.cantilever.own_terms import own_term as own_term
 from .loop.kinds.cantilever.terms import strip_term as strip_term
 from .loop.kinds.cantilever.variant import StripVariant as StripVariant
 from .loop.kinds.drape.model import Drape as Drape

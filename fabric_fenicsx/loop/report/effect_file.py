@@ -112,33 +112,8 @@ EFFECTS = [
 OF_EACH = """
 import fabric_fenicsx as ff
 
-OWN = ff.Parameter("{name}_{own}", amplitude=True, meaning="of a {x}; no other has the same")
-FOUND = ff.StripVariant("each its own", (OWN,), {options})
-EFFECTS = [ff.Effect("{name}", "cantilever", "{about}", (FOUND,), of_fabric=False)]
+EFFECTS = [ff.own_term("{name}", form="{label}")]
 """
-
-
-OWN = {
-    "zero": ("zero_mm", "each_run=True"),
-    "zero, each specimen its own": (
-        "zero_mm",
-        "each_specimen=True, camera=lambda p, at: (0.0, p[OWN.name])",
-    ),
-    "scale, each specimen its own": (
-        "scale",
-        "each_specimen=True, camera=lambda p, at: (0.0, p[OWN.name] * at['z'])",
-    ),
-    "turned, each specimen its own": (
-        "turn_rad",
-        "each_specimen=True, camera=lambda p, at: (-p[OWN.name] * at['z'], p[OWN.name] * at['x'])",
-    ),
-    "even, each specimen its own": (
-        "even_1_mm",
-        "each_specimen=True, added_curvature=lambda p, at: p[OWN.name]",
-    ),
-}
-"""What each run or specimen has of its own, by the label of a strip's form: its parameter's name,
-and what the form is."""
 
 
 def effect_file(term: Discovered, titles: str) -> str:
@@ -163,8 +138,7 @@ def effect_file(term: Discovered, titles: str) -> str:
         "acts_on": term.effect.acts_on,
     }
     if shape.points:
-        words["own"], words["options"] = OWN[term.variant.label]
-        return (HEAD + OF_EACH).format(**words)
+        return (HEAD + OF_EACH).format(label=term.variant.label, **words)
     if term.effect.test == "cantilever":
         values = _plain({p.name: term.values[p.name] for p in term.variant.parameters})
         ranges = _plain(shape.fixed["ranges"])

@@ -6,7 +6,7 @@ stiffness is the model's (see variances).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -16,7 +16,52 @@ from ...inference.effects import Effect, Shape, Values, of_run, of_specimen
 from .term import X, Y, strip_effect, turned
 from .variant import StripVariant
 
-__all__ = ["own_terms"]
+__all__ = ["own_term", "own_terms"]
+
+RUN, SPECIMEN = "each_run", "each_specimen"
+EACH = ", each specimen its own"
+
+FORMS: dict[str, tuple[str, str, str, dict[str, Callable[[Any, Values], Any]]]] = {
+    "zero": ("zero_mm", X["z"], RUN, {}),
+    f"zero{EACH}": ("zero_mm", X["z"], SPECIMEN, {"camera": lambda own, at: (0.0, own)}),
+    f"scale{EACH}": (
+        "scale",
+        "share_of_height",
+        SPECIMEN,
+        {"camera": lambda own, at: (0.0, own * at["z"])},
+    ),
+    f"turned{EACH}": ("turn_rad", "turn_rad", SPECIMEN, {"camera": turned}),
+    f"even{EACH}": (
+        "0_1_mm",
+        Y["rest_curvature"],
+        SPECIMEN,
+        {"added_curvature": lambda own, at: own},
+    ),
+}
+"""By label of a form: what its number is called, as a shape as well, whose it is, and what it does
+at a place of a strip."""
+
+TERMS = {
+    "reading_of_run": (
+        "reading",
+        ("run",),
+        "heights, or their scale, in each run or of each specimen",
+        ("zero", f"zero{EACH}", f"scale{EACH}"),
+    ),
+    "reading_of_distance_and_run": (
+        "reading",
+        ("distance", "run"),
+        "a turn of the camera for each specimen",
+        (f"turned{EACH}",),
+    ),
+    "rest_curvature_of_run": (
+        "rest_curvature",
+        ("run",),
+        "curvature of the unloaded strip that is each specimen's own",
+        (f"even{EACH}",),
+    ),
+}
+"""What a term acts on and depends on, in words, and its forms."""
 
 
 def own_terms(runs: Sequence[int], specimens: Sequence[int]) -> Iterator[Effect]:
@@ -26,49 +71,47 @@ def own_terms(runs: Sequence[int], specimens: Sequence[int]) -> Iterator[Effect]
         runs: that are fitted, counted from 0; there is none of a single one.
         specimens: likewise; none where nothing can be told of each.
     """
-    name = "reading_of_run"
-    zero = Parameter(f"{name}_zero_mm", amplitude=True)
-    forms = []
-    if len(runs) > 1:
-        each = [of_run(zero, k) for k in runs]
-        parameters, shape = _each(each, "run", X["z"])
-        forms.append(StripVariant("zero", parameters, shape=shape, each_run=True))
-    scale = Parameter(f"{name}_scale", amplitude=True)
-    for label, own, y, camera in (
-        ("zero", zero, X["z"], lambda p, at: (0.0, p[zero.name])),
-        ("scale", scale, "share_of_height", lambda p, at: (0.0, p[scale.name] * at["z"])),
-    ):
-        forms += _each_specimen(label, own, specimens, y, camera=camera)
-    if forms:
-        about = "heights, or their scale, in each run or of each specimen"
-        yield strip_effect(name, about, "reading", ("run",), forms)
-    if not specimens:
-        return
-    name = "reading_of_distance_and_run"
-    turn = Parameter(f"{name}_turn_rad", amplitude=True)
-    forms = _each_specimen(
-        "turned", turn, specimens, "turn_rad", camera=lambda p, at: turned(p[turn.name], at)
-    )
-    about = "a turn of the camera for each specimen"
-    yield strip_effect(name, about, "reading", ("distance", "run"), forms)
-    name = "rest_curvature_of_run"
-    bent = Parameter(f"{name}_0_1_mm", amplitude=True)
-    y = Y["rest_curvature"]
-    forms = _each_specimen("even", bent, specimens, y, added_curvature=lambda p, at: p[bent.name])
-    about = "curvature of the unloaded strip that is each specimen's own"
-    yield strip_effect(name, about, "rest_curvature", ("run",), forms)
+    for name, (acts_on, depends_on, about, labels) in TERMS.items():
+        forms = []
+        for label in labels:
+            own, y, whose, options = _form(name, label)
+            each = [of_specimen(own, k) for k in specimens]
+            if whose == RUN:
+                each = [of_run(own, k) for k in runs] if len(runs) > 1 else []
+            if each:
+                parameters, shape = _each(each, whose.removeprefix("each_"), y)
+                forms.append(StripVariant(label, parameters, shape=shape, **options))
+        if forms:
+            yield strip_effect(name, about, acts_on, depends_on, forms)
 
 
-def _each_specimen(
-    label: str, own: Parameter, specimens: Sequence[int], y: str, **expression: Any
-) -> list[StripVariant]:
-    """A form of which each specimen has a parameter of its own, if there are specimens."""
-    each = [of_specimen(own, k) for k in specimens]
-    if not each:
-        return []
-    parameters, shape = _each(each, "specimen", y)
-    label = f"{label}, each specimen its own"
-    return [StripVariant(label, parameters, shape=shape, each_specimen=True, **expression)]
+def own_term(name: str, form: str) -> Effect:
+    """One of the forms as an effect: its numbers are found anew, no other strip has the same.
+
+    Args:
+        name: of the effect.
+        form: its label.
+
+    Raises:
+        ValueError: there is no such form.
+    """
+    about = [of[2] for of in TERMS.values() if form in of[3]]
+    if not about:
+        raise ValueError(f"{form}: no such form of what each run or specimen has of its own")
+    own, _, _, options = _form(name, form)
+    variant = StripVariant("each its own", (own,), **options)
+    return Effect(name, "cantilever", about[0], (variant,), of_fabric=False)
+
+
+def _form(name: str, label: str) -> tuple[Parameter, str, str, dict[str, Any]]:
+    """Of a form of an effect its number, that as a shape, whose it is, and what a variant has."""
+    called, y, whose, what = FORMS[label]
+    own = Parameter(f"{name}_{called}", amplitude=True)
+
+    def at_its_value(does: Callable[[Any, Values], Any]) -> Callable[[Values, Values], Any]:
+        return lambda p, at: does(p[own.name], at)
+
+    return own, y, whose, {whose: True, **{of: at_its_value(does) for of, does in what.items()}}
 
 
 def _each(own: Sequence[Parameter], of: str, y: str) -> tuple[tuple[Parameter, ...], Shape]:
