@@ -19,19 +19,31 @@ def three_cores(monkeypatch):
     monkeypatch.setattr(copies, "cores", lambda: 3)
 
 
-def no_child_left():
-    with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
+@pytest.fixture
+def made(monkeypatch):
+    """Processes that were made, two of them; at the end none of them is there any more."""
+    numbers = []
+    fork = os.fork
+
+    def noted():
+        numbers.append(fork())
+        return numbers[-1]
+
+    monkeypatch.setattr(os, "fork", noted)
+    yield numbers
+    assert len(numbers) == 2
+    for number in numbers:
+        with pytest.raises(ProcessLookupError):
+            os.kill(number, 0)
 
 
-def test_answers_come_in_the_order_of_the_tasks_from_as_many_processes_as_cores():
+def test_answers_come_in_the_order_of_the_tasks_from_as_many_processes_as_cores(made):
     own = os.getpid()
     found = in_copies(lambda k: (k**2, os.getpid()), range(8))
     assert [square for square, _ in found] == [k**2 for k in range(8)]
     pids = [pid for _, pid in found]
     assert pids[::3] == [own] * 3
     assert len(set(pids)) == 3 and pids[1] == pids[4] and pids[2] == pids[5]
-    no_child_left()
 
 
 def test_one_task_or_one_core_needs_no_copy(monkeypatch):
@@ -55,7 +67,7 @@ def test_a_large_answer_fits_through():
 
 
 @pytest.mark.parametrize("where", [0, 1])
-def test_what_is_raised_of_a_task_is_raised_here(where):
+def test_what_is_raised_of_a_task_is_raised_here(where, made):
     def strict(k):
         if k == where:
             raise SolveError(f"task {k}")
@@ -63,10 +75,9 @@ def test_what_is_raised_of_a_task_is_raised_here(where):
 
     with pytest.raises(SolveError, match=f"task {where}"):
         in_copies(strict, range(6))
-    no_child_left()
 
 
-def test_a_copy_that_is_killed_is_an_error_and_no_answer():
+def test_a_copy_that_is_killed_is_an_error_and_no_answer(made):
     own = os.getpid()
 
     def mortal(k):
@@ -76,10 +87,9 @@ def test_a_copy_that_is_killed_is_an_error_and_no_answer():
 
     with pytest.raises(SolveError, match="has ended"):
         in_copies(mortal, range(3))
-    no_child_left()
 
 
-def test_an_interrupt_ends_the_copies():
+def test_an_interrupt_ends_the_copies(made):
     own = os.getpid()
 
     def slow(_):
@@ -89,7 +99,6 @@ def test_an_interrupt_ends_the_copies():
 
     with pytest.raises(KeyboardInterrupt):
         in_copies(slow, range(3))
-    no_child_left()
 
 
 def test_a_diagnosis_is_the_same_to_the_last_digit_however_many_share_it(monkeypatch):

@@ -444,26 +444,29 @@ class _Model:
 
 
 def linearised(experiment: Experiment, model: Fit) -> Linearised:
-    """A fitted model to first order about the common parameters, for its variance components."""
+    """A fitted model to first order about the common parameters, for its variance components.
+
+    Columns are those of specimens that are alike: were two parameters that do the same, as the
+    elastic spring and a moment by the angle do, each with deviations of its own in them, then their
+    difference would be of specimens, and free.
+    """
     rows, count = model.used, len(model.values)
     groups = groups_of(experiment, model.variants)
     free = [k for k, name in enumerate(model.values) if name not in model.at_bound]
     specimen = model.readings.specimen
     residual = model.residual[rows].copy()
+    common = model.slopes[:, :count].copy()
     specimens: dict[str, Array] = {}
     everyone = np.arange(len(model.readings.specimens))
     place = {name: k for k, name in enumerate(model.values)}
     for group, names in groups.items():
-        own_slopes = [model.slopes[:, place[name]] * model.values[name] for name in names]
-        whole = np.sum(own_slopes, axis=0)
-        if group in model.deviations:
-            own = model.deviations[group][specimen]
-            whole = whole / (1.0 + own)
-            residual += (whole * own)[rows]
+        own = model.deviations[group][specimen] if group in model.deviations else 0.0
+        for name in names:
+            common[:, place[name]] /= 1.0 + own
+        whole = np.sum([common[:, place[name]] * model.values[name] for name in names], axis=0)
+        residual += (whole * own)[rows]
         specimens[group] = (whole[:, None] * (specimen[:, None] == everyone))[rows]
-    return Linearised(
-        residual, model.slopes[:, :count][:, free][rows], specimens, model.readings, rows
-    )
+    return Linearised(residual, common[:, free][rows], specimens, model.readings, rows)
 
 
 def soft_size(r: Array, robust: float | None) -> float:

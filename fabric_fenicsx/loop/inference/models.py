@@ -212,9 +212,12 @@ class Models:
             found = around_jumps(self.experiment, model.fit, CRITERIA.evaluations, None)
             if found is not model.fit:
                 model = self.judge.weighed(found, model.effects)
-            return self._again(model, self.judge.averaged(model), CRITERIA.final_evaluations)
+            last = self._again(model, self.judge.averaged(model), CRITERIA.final_evaluations)
         except SolveError:
             return model
+        # What was chosen is reported, and not a fit that went astray on the way.
+        left, before = (one.fit.rms(one.fit.used) for one in (last, model))
+        return last if left <= CRITERIA.scatter * before else model
 
     def best_refined(self, models: list[Model]) -> list[Model]:
         """Models, the best first; the best of each set of effects was fitted again.

@@ -145,8 +145,9 @@ def _against_a_term(
             # What is beaten so is not it, whether or not what beats it is all that there is.
             further.most = None
             return _beside(further.run(), found)
-        if search.judge.slow_noise(final):
-            # As slow as a misfit: what several terms explain instead is not said to be noise.
+        doubted = len(chosen.effects) > 1 and search.doubtful_noise
+        if doubted or search.judge.slow_noise(final):
+            # It may be a misfit: what several terms explain instead is not said to be noise.
             several = _several(further, final.criterion)
             if several is not None:
                 return _beside(several, found)

@@ -237,6 +237,9 @@ ALIKE = {
 }
 """Bases of one term: frictions, ways by |γ| or by γ, and what is added or is a factor."""
 
+OF_BASELINE = (("odd", "angle"), ("odd_in_rate", "rate"))
+"""Bases and variables in proportion to which the baseline has a moment, by k1 or c1."""
+
 ABOUT = {
     "rest": "state of rest of the elastic moment",
     "outward": "moment on one way alone",
@@ -286,6 +289,8 @@ def _laws(
     if (base, variable) == ("elastic", "angle"):
         # Splines are those of an odd moment.
         drawn = [one for one in drawn if one[2]["shape"] != "spline"]
+    if (base, variable) in OF_BASELINE:
+        drawn = [*_beyond_a_line(drawn)]
     if (base, variable) in FINE or variable == "time":
         drawn += [*bumps(name), *two_bumps(name)]
     if variable == "time":
@@ -300,6 +305,15 @@ def _laws(
             form = _law_form(f"{words}, {label}{also}", own, carried, like)
             first = first or form
             yield form
+
+
+def _beyond_a_line(drawn: Iterable[Drawn]) -> Iterator[Drawn]:
+    """Splines without their line, which the baseline has: two of one could be any size."""
+    for label, coefficients, numbers in drawn:
+        if numbers["shape"] not in ("spline", "graded"):
+            yield label, coefficients, numbers
+        elif len(coefficients) > 1:
+            yield label, (0.0, *coefficients[1:]), numbers
 
 
 def _law_form(
