@@ -63,6 +63,15 @@ CASES = {
         {"compliance_rad_per_N": 20.0 / B},
         {"compliance": 20.0 / B},
     ),
+    "compliance by a power": (
+        ("clamp_compliance", "power"),
+        {
+            "compliance_rad_per_N": 20.0 / B,
+            "clamp_moment_N": 0.3 * B * CRITICAL,
+            "clamp_exponent": 0.5,
+        },
+        {"compliance": 20.0 / B, "yielding": (0.3 * B * CRITICAL, 0.5)},
+    ),
     "tilt": (("clamp_tilt", "constant"), {"tilt_rad": -0.1}, {"tilt": -0.1}),
 }
 

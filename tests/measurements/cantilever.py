@@ -2,7 +2,7 @@
 
 Per unit width, s the arc length from the clamp, phi the slope (up positive), M the moment [N]:
     dM/ds = W(s) cos phi,  M(L) = 0,  W(s) the weight outboard of s [N/mm],
-    dphi/ds = kappa0 + kappa(M),  phi(0) = tilt + compliance M(0),
+    dphi/ds = kappa0 + kappa(M),  phi(0) = tilt + compliance M(0) (1 + (M(0)/m)^2)^((n-1)/2),
     dx/ds = cos phi,  dz/ds = sin phi.
 It is integrated from the free end, whose slope is searched. Units: N, mm, rad, tonne.
 """
@@ -34,6 +34,8 @@ class Strip:
     curvature: float = 0.0  # 1/mm, of the unloaded sheet
     tilt: float = 0.0  # rad, up positive
     compliance: float = 0.0  # rad per N mm/mm: root rotation per moment per width
+    # Moment [N] beyond which it is a power of the moment, and which one.
+    yielding: tuple[float, float] = (1.0, 1.0)
     taper: float = 0.0  # thickness h(s)/h(0) - 1 at the free end
     tip_weight: float = 0.0  # N/mm
 
@@ -112,7 +114,9 @@ def hang(strip: Strip) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 
     def misfit(tip: np.ndarray) -> np.ndarray:
         moment, slope = _from_the_tip(strip, tip)
-        return slope[0] - strip.tilt - strip.compliance * moment[0]
+        bend, power = strip.yielding
+        larger = (1 + (moment[0] / bend) ** 2) ** ((power - 1) / 2)
+        return slope[0] - strip.tilt - strip.compliance * moment[0] * larger
 
     unloaded = strip.tilt + strip.curvature * strip.length
     tips = np.linspace(unloaded + 1e-9, min(unloaded, 0) - 1.75, 80)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from ....mechanics.bending_laws import (
     BendingLaw,
@@ -50,6 +51,30 @@ YIELDS = tuple(
     for k, r in enumerate(SLIPS, 1)
 )
 STIFFENING = replace(CUBIC, lower=0.0)
+
+COMPLIANCE = Parameter(
+    "compliance_rad_per_N",
+    lower=0.0,
+    amplitude=True,
+    meaning="turn of the root per moment per width",
+)
+IN_PROPORTION = Parameter(
+    "clamp_moment_N",
+    (0.2,),
+    0.02,
+    2.0,
+    meaning="moment per width up to which the clamp yields in proportion",
+    share_of="moment",
+)
+EXPONENT = Parameter(
+    "clamp_exponent", (0.5, 2.0), 0.2, 4.0, meaning="power of larger ones that it yields by"
+)
+
+
+def _by_a_power(p: Values, root: Any) -> Any:
+    """A turn that is linear in small moments: c M (1 + (M/m)²)^((n − 1)/2)."""
+    larger = 1 + (root / p[IN_PROPORTION.name]) ** 2
+    return p[COMPLIANCE.name] * root * larger ** ((p[EXPONENT.name] - 1) / 2)
 
 
 def _slipping(label: str, law: type[SlippingBending]) -> StripVariant:
@@ -102,17 +127,9 @@ CANTILEVER_EFFECTS = (
         "the clamp yields: a rotation spring at the root",
         (
             StripVariant(
-                "linear",
-                (
-                    Parameter(
-                        "compliance_rad_per_N",
-                        lower=0.0,
-                        amplitude=True,
-                        meaning="turn of the root per moment per width",
-                    ),
-                ),
-                slope=lambda p, root: p["compliance_rad_per_N"] * root,
+                "linear", (COMPLIANCE,), slope=lambda p, root: p["compliance_rad_per_N"] * root
             ),
+            StripVariant("power", (COMPLIANCE, IN_PROPORTION, EXPONENT), slope=_by_a_power),
         ),
         of_fabric=False,
     ),
