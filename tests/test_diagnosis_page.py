@@ -223,6 +223,11 @@ def test_the_headline_names_specimens_that_differ_beyond_doubt():
     }
     said = headline(REPORT | {"scatter": scatter})
     assert said == plain + " Specimens differ by 12 ± 3 % (k1_N)."
+    # What several numbers of an effect differ in is that effect; a sum of effects has no name.
+    together = {"m_1 m_2": {"share": 0.12, "std": 0.03}, "m_1 n": {"share": 0.2, "std": 0.03}}
+    term = {"name": "discovered_1", "parameters": {"m_1": 1.0, "m_2": 2.0, "m_place": 0.5}}
+    said = headline(REPORT | {"scatter": together, "effects": [term]})
+    assert said.endswith(" Specimens differ by 12 ± 3 % (discovered_1), 20 ± 3 % (m_1, n).")
     # Of a model that does not explain the data they are not known.
     assert "pecimen" not in headline(REPORT | {"verdict": "unexplained", "scatter": scatter})
 

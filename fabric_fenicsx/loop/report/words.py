@@ -189,12 +189,20 @@ def _foreseen(report: Mapping[str, Any]) -> str:
 
 def _specimens(report: Mapping[str, Any]) -> Iterator[str]:
     differ = [
-        f"{100.0 * s['share']:.0f} ± {100.0 * s['std']:.0f} % ({name})"
-        for name, s in report["scatter"].items()
+        f"{100.0 * s['share']:.0f} ± {100.0 * s['std']:.0f} % ({_called(report, group)})"
+        for group, s in report["scatter"].items()
         if s["share"] > max(SMALL_SCATTER, CRITERIA.significant * s["std"])
     ]
     if differ:
         yield f"Specimens differ by {', '.join(differ)}."
+
+
+def _called(report: Mapping[str, Any], group: str) -> str:
+    """What specimens differ in together: a parameter, or the effect that several are of."""
+    names = group.split()
+    every = [*report["effects"], *report["discovered"]]
+    of = [effect["name"] for effect in every if set(names) <= set(effect["parameters"])]
+    return of[0] if len(names) > 1 and of else ", ".join(names)
 
 
 def _noise(report: Mapping[str, Any]) -> Iterator[str]:
