@@ -15,14 +15,14 @@ t the tangent of the slope of a smooth line through the readings, r the scatter 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline, PPoly
+from scipy.interpolate import CubicSpline
 
 from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
@@ -31,6 +31,7 @@ from ...inference.experiment import NO_DEVIATIONS, Deviations, Law
 from ...measurement.readings import common_noise, readings_of, specimens_of
 from ...measurement.schema import Measurement
 from ..records import FEWEST_BEFORE, earlier_alike, last_run
+from .compared import HungStrip, expected_heights, places_on
 from .each_specimen import EachSpecimen, names_of
 from .effects import CANTILEVER_EFFECTS
 from .hanging import HangingTow, Laws, Shape, sum_of
@@ -52,8 +53,6 @@ STEEPEST = 5.0
 LAW_POINTS = 201
 #: Times the baseline's largest curvature up to which a law is looked at at all.
 FAR = 10
-#: Points on a predicted line among which the nearest to a reading is looked for.
-FINE = 400
 
 PLACE = ("s", "length", "run")
 LAWS: dict[str, tuple[str, tuple[str, ...], bool]] = {
@@ -65,29 +64,6 @@ LAWS: dict[str, tuple[str, tuple[str, ...], bool]] = {
     "load": ("load", PLACE, True),
 }
 """Expressions of a variant: what they give (see Laws), of what, and whether of a place as one."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Specimen:
-    """Readings of one tow.
-
-    Attributes:
-        tow: its model.
-        specimen: its number.
-        run: its number.
-        rows: places of the readings, (n,).
-        s, x, z: of the readings [mm], (n,); s is NaN where it is not known.
-        upside_down: whether it was turned over in its clamp.
-    """
-
-    tow: HangingTow
-    specimen: int
-    run: int
-    rows: npt.NDArray[np.int64]
-    s: Array
-    x: Array
-    z: Array
-    upside_down: bool
 
 
 class Cantilever:
@@ -253,7 +229,7 @@ class Cantilever:
         for own in dict.fromkeys(keys):
             rows = np.array([i for i, other in enumerate(keys) if other == own])
             self._specimens.append(
-                _Specimen(
+                HungStrip(
                     tows[own[2]],
                     own[0],
                     own[1],
@@ -290,7 +266,9 @@ class Cantilever:
             for own in self._specimens:
                 share = own.tow.load_per_C1 / longest.load_per_C1
                 x, z = own.tow.length * _between(np.log(loads), table, np.log(load * share))
-                total += float(np.abs(own.z - self._heights(own, x, z, {})[0]).sum())
+                total += float(
+                    np.abs(own.z - expected_heights(own, self._steepness, x, z, {})[0]).sum()
+                )
             misses.append(total)
         longest.solve({"C1_MPa": longest.load_per_C1 / loads[0]}, slopes=False)
         return float(longest.load_per_C1 / loads[int(np.argmin(misses))])
@@ -319,7 +297,7 @@ class Cantilever:
         curvatures, moments = [], []
         for own in self._specimens:
             shape = own.tow.solve({"C1_MPa": C1}, slopes=False)
-            arc[own.rows] = self._places(
+            arc[own.rows] = places_on(
                 own, CubicSpline(own.tow.arc, np.stack([shape.x, shape.z], axis=1))
             )
             curvatures.append(float(np.abs(shape.curvature).max()))
@@ -385,7 +363,9 @@ class Cantilever:
             mine = each.values(mine, own.specimen)
             key = (id(own.tow), *mine.values())
             shape = shapes[key] = shapes.get(key) or own.tow.solve(mine, laws[own.upside_down])
-            heights, changes = self._heights(own, *self._seen(shape, own, strips, mine))
+            heights, changes = expected_heights(
+                own, self._steepness, *self._seen(shape, own, strips, mine)
+            )
             changes = each.slopes(changes, own.specimen)
             for zeros in (v for v in strips if v.each_run):
                 heights, changes = self._with_zero(own, zeros, values, heights, changes)
@@ -428,49 +408,6 @@ class Cantilever:
                 slopes[name] = slopes.get(name, 0.0) + scale * slope
         return Law("curvature_1_mm", "moment_N", kappa, moment, slopes)
 
-    def _heights(
-        self, own: _Specimen, x: Array, z: Array, slopes: Mapping[str, Array]
-    ) -> tuple[Array, dict[str, Array]]:
-        """Expected readings of a specimen and their derivatives, from those of the nodes."""
-        # Of the places and of what they change by at once: they have the same nodes.
-        every = CubicSpline(own.tow.arc, np.stack([(x, z), *slopes.values()]).transpose(2, 0, 1))
-        line = PPoly.construct_fast(every.c[:, :, 0], every.x)
-        at = self._places(own, line)
-        readings = np.stack([own.x, own.z], axis=1)
-        along = line(at, 1)
-        along /= np.linalg.norm(along, axis=1)[:, None]
-        free = np.isnan(own.s)
-        normal = np.tile([0.0, 1.0], (len(at), 1))
-        stands_for = np.sqrt(1.0 + self._steepness[own.rows[free]] ** 2)
-        normal[free] = np.stack([-along[free, 1], along[free, 0]], axis=1) * stands_for[:, None]
-        expected = own.z - np.einsum("nd,nd->n", normal, readings - line(at))
-        if not slopes:
-            return expected, {}
-        # The place on the line moves as well, but only along it; beyond the ends of the line a
-        # reading is compared with its tangent, which turns.
-        beyond = np.einsum("nd,nd->n", along, readings - line(at)) * free
-        change = (every(at) + beyond[:, None, None] * every(at, 1))[:, 1:]
-        changes = np.einsum("nkd,nd->kn", change, normal)
-        return expected, dict(zip(slopes, changes, strict=True))
-
-    def _places(self, own: _Specimen, line: PPoly) -> Array:
-        """Arc length of each reading [mm]: as given, or of the nearest point of a line."""
-        free = np.isnan(own.s)
-        at = own.s.copy()
-        if free.any():
-            grid = np.linspace(0.0, own.tow.length, FINE + 1)
-            readings = np.stack([own.x[free], own.z[free]], axis=1)
-            away = np.linalg.norm(readings[:, None, :] - line(grid)[None, :, :], axis=2)
-            s = first = grid[np.argmin(away, axis=1)]
-            for _ in range(4):
-                gap, tangent, bend = line(s) - readings, line(s, 1), line(s, 2)
-                fall = np.einsum("nd,nd->n", gap, tangent)
-                rise = np.einsum("nd,nd->n", gap, bend) + np.einsum("nd,nd->n", tangent, tangent)
-                s = np.clip(s - fall / np.maximum(rise, 0.1), first - grid[1], first + grid[1])
-                s = np.clip(s, 0.0, own.tow.length)
-            at[free] = s
-        return at
-
     def _laws(self, variants: Sequence[StripVariant], upside_down: bool) -> Laws:
         def those(*names: str) -> list[Marched]:
             mine = ((v, name) for name in names for v in variants if getattr(v, name) is not None)
@@ -503,7 +440,7 @@ class Cantilever:
 
     def _with_zero(
         self,
-        own: _Specimen,
+        own: HungStrip,
         variant: StripVariant,
         values: Mapping[str, float],
         heights: Array,
@@ -522,7 +459,7 @@ class Cantilever:
     def _seen(
         self,
         shape: Shape,
-        own: _Specimen,
+        own: HungStrip,
         variants: Sequence[StripVariant],
         values: Mapping[str, float],
     ) -> tuple[Array, Array, dict[str, Array]]:
