@@ -7,6 +7,7 @@ then is lost with it but for what it returns. Nothing that needs MPI or PETSc is
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import signal
@@ -19,6 +20,9 @@ from ..errors import SolveError
 from ..parallel import cores
 
 __all__ = ["in_copies"]
+
+#: Processes at most: a search has little that many could share, and each needs memory.
+MOST = 8
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -41,7 +45,7 @@ def in_copies(
         SolveError: a copy has ended before it was done, for want of memory perhaps.
         Exception: what the function raised of a task.
     """
-    count = min(cores(), len(tasks))
+    count = min(cores(), len(tasks), MOST)
     if count < 2:
         return [function(task) for task in tasks]
     shared = list(known)
@@ -73,6 +77,8 @@ class _Copy:
         if self._process == 0:
             # No handler, buffer or exit function of the process that it is a copy of may run.
             try:
+                # Memory is shared as long as nobody writes to it, as the collector does.
+                gc.disable()
                 os.close(ours)
                 signal.signal(signal.SIGINT, signal.SIG_DFL)
                 signal.signal(signal.SIGTERM, signal.SIG_DFL)
