@@ -34,10 +34,10 @@ class Strip:
     curvature: float = 0.0  # 1/mm, of the unloaded sheet
     tilt: float = 0.0  # rad, up positive
     compliance: float = 0.0  # rad per N mm/mm: root rotation per moment per width
-    # Moment [N] beyond which it is a power of the moment, and which one.
-    yielding: tuple[float, float] = (1.0, 1.0)
     taper: float = 0.0  # thickness h(s)/h(0) - 1 at the free end
     tip_weight: float = 0.0  # N/mm
+    # Moment [N] beyond which it is a power of the moment, and which one.
+    yielding: tuple[float, float] = (1.0, 1.0)
 
 
 def moment_ratio(law: tuple[str, float, float] | None, y: np.ndarray) -> np.ndarray:
