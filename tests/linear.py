@@ -7,6 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fabric_fenicsx.inputs.parameters import Parameter
+from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS, Readings
 
 
@@ -39,6 +40,12 @@ def readings(observed, *, run=None, holdout=(), specimen=None, **more):
         specimens=tuple(f"specimen {k}" for k in range(specimen.max() + 1)),
         **(given | more),
     )
+
+
+def linear_effect(name, *amplitudes, acts_on=""):
+    """An effect of one form, by default with one amplitude, of the same name."""
+    own = amplitudes or (Parameter(name, amplitude=True),)
+    return Effect(name, "linear", "", (Variant("only", own),), acts_on=acts_on)
 
 
 class Linear:

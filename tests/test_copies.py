@@ -5,12 +5,11 @@ import signal
 
 import numpy as np
 import pytest
-from linear import Linear, readings
+from linear import Linear, linear_effect, readings
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop import copies
 from fabric_fenicsx.loop.copies import in_copies
-from fabric_fenicsx.loop.inference.effects import Effect, Parameter, Variant
 from fabric_fenicsx.loop.inference.search import diagnose_test
 
 
@@ -107,11 +106,7 @@ def test_a_diagnosis_is_the_same_to_the_last_digit_however_many_share_it(monkeyp
     clean = 1.0 + 2.0 * t + columns["c3"] - columns["c7"]
     observed = clean + 0.01 * np.random.default_rng(4).normal(size=len(t))
     test = Linear(readings(observed, run=np.repeat(np.arange(3), 60)), columns, ("a", "b"))
-    own = {f"c{k}": (Parameter(f"c{k}", amplitude=True),) for k in range(2, 9)}
-    test.effects = [
-        Effect(name, "linear", "", (Variant("only", parameters),))
-        for name, parameters in own.items()
-    ]
+    test.effects = [linear_effect(f"c{k}") for k in range(2, 9)]
     test.terms, test.terms_are_rivals = (), False
     found = []
     for count in (3, 1):

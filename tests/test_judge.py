@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from linear import Linear, readings
+from linear import Linear, linear_effect, readings
 from scipy.signal import lfilter
 
 from fabric_fenicsx.inputs.parameters import Parameter
@@ -40,8 +40,7 @@ def judged(acts_on="", since=0.5, stated=SIGMA, scatter=SIGMA, size=1.0):
     bend = np.maximum(t - since, 0.0) ** 2
     observed = 2.0 + t + size * bend + scatter * np.random.default_rng(1).normal(size=120)
     data = readings(observed, run=run, holdout=(1,), specimen=np.zeros_like(run))
-    amplitude = Parameter("bend", (), amplitude=True)
-    effect = Effect("bend", "linear", "", (Variant("only", (amplitude,)),), acts_on=acts_on)
+    effect = linear_effect("bend", acts_on=acts_on)
     columns = {"a": np.ones_like(t), "b": t, "bend": bend}
     test = Linear(data, columns, ("a", "b"), effects=[effect], noise=stated)
     judge = Judge(test, [effect])
@@ -72,7 +71,7 @@ def test_a_held_out_specimen_may_be_nearer_to_what_lacks_the_term(acts_on):
     stiff = np.array([1.06, 0.95, 1.05, 0.94, 0.9])[run]
     observed = stiff * t + wave + 0.01 * np.random.default_rng(3).normal(size=len(t))
     data = readings(observed, run=run, holdout=(4,))
-    effect = Effect("wave", "linear", "", (Variant("only", (WAVE,)),), acts_on=acts_on)
+    effect = linear_effect("wave", WAVE, acts_on=acts_on)
     test = Linear(data, {"b": t, "wave": wave}, ("b",), effects=[effect], noise=0.01)
     judge = Judge(test, [effect])
     # The noise of a model is what it leaves.
@@ -152,12 +151,11 @@ def test_what_two_terms_explain_is_not_a_name_with_slow_noise(truth, found):
     observed = 1.0 + 2.0 * t + clean + 0.01 * np.random.default_rng(4).normal(size=len(t))
     test = Linear(readings(observed, run=np.repeat(np.arange(3), 120)), columns, ("a", "b"))
 
-    def effect(name, acts_on):
-        own = (Parameter(name, amplitude=True),)
-        return Effect(name, "linear", "", (Variant("only", own),), acts_on=acts_on)
-
-    test.effects = [effect("both", "")]
-    test.terms = [effect("wave", "moment"), effect("step", "reading")]
+    test.effects = [linear_effect("both")]
+    test.terms = [
+        linear_effect("wave", acts_on="moment"),
+        linear_effect("step", acts_on="reading"),
+    ]
     test.terms_are_rivals = test.each_its_own_way = False
     assert {e.name for e in diagnose_test(test).effects} == found
 
@@ -178,11 +176,7 @@ def test_a_misfit_that_held_out_runs_contradict_is_not_noise(held, verdict):
     observed = 100.0 + 2.0 * t + seen + 0.03 * rng.normal(size=len(t))
     test = Linear(readings(observed, run=run, holdout=(3,)), columns, ("a", "b"))
 
-    def effect(name, acts_on):
-        own = (Parameter(name, amplitude=True),)
-        return Effect(name, "linear", "", (Variant("only", own),), acts_on=acts_on)
-
-    test.effects, test.terms = [effect("kink", "")], [effect("rough", "moment")]
+    test.effects, test.terms = [linear_effect("kink")], [linear_effect("rough", acts_on="moment")]
     test.terms_are_rivals = test.each_its_own_way = False
     assert diagnose_test(test, ["kink"]).verdict == "no_effect"
     found = diagnose_test(test)
@@ -210,8 +204,9 @@ def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None):
     roundness = (Parameter("bend_more", (0.5,), 0.0, bound),) if more else ()
 
     def effect(name, acts_on="", also=()):
-        own = (Parameter(f"{name}_size", amplitude=True), *also)
-        return Effect(name, "linear", "", (Variant("only", own),), acts_on=acts_on)
+        return linear_effect(
+            name, Parameter(f"{name}_size", amplitude=True), *also, acts_on=acts_on
+        )
 
     test = Linear(readings(observed, run=run), columns, ("a", "b"), noise=SIGMA)
     test.effects, test.terms = [effect("bend", also=roundness)], [effect("round", "reading")]

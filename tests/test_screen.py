@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from linear import Linear, covariance, readings
+from linear import Linear, covariance, linear_effect, readings
 from scipy.stats import chi2
 
 from fabric_fenicsx.inputs.parameters import Parameter
@@ -20,7 +20,7 @@ NOISE, TAU = Noise(0.1, 0.0, 0.3), 0.2
 
 def effect(name, *names, lower=-np.inf):
     amplitudes = tuple(Parameter(n, (), lower, amplitude=True) for n in names)
-    return Effect(name, "linear", "", (Variant("only", amplitudes),))
+    return linear_effect(name, *amplitudes)
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,7 @@ def diagnose_test(
         further.most = None
         return _beside(further.run(), found)
     doubt = _doubt(search)
-    return found if doubt is None else _against_a_term(search, found, further, doubt, progress)
+    return found if doubt is None else _against_a_term(search, further, doubt)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,27 +99,19 @@ def _doubt(search: Search) -> _Doubt | None:
     return None
 
 
-def _against_a_term(
-    search: Search,
-    found: Diagnosis,
-    further: Search,
-    doubt: _Doubt,
-    progress: Callable[[float, str], None],
-) -> Diagnosis:
+def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis:
     """The diagnosis that stands when terms have been tried as well.
 
     Args:
         search: of the effects with a name.
-        found: its diagnosis.
-        further: a search of these and all terms.
+        further: of these and all terms.
         doubt: what speaks for it.
-        progress: see diagnose_test.
     """
-    chosen = search.chosen
-    assert chosen is not None
+    found, chosen = search.found, search.chosen
+    assert found is not None and chosen is not None
     single, other, least = further, further.found, doubt.least
     if len(chosen.effects) < 2 or other is None:
-        single = Search(search.experiment, doubt.terms, progress, most=1)
+        single = Search(search.experiment, doubt.terms, search.progress, most=1)
         other = single.run()
     search.judge.compared = True
     final = search.judge.weighed(chosen.fit, chosen.effects)
@@ -130,9 +122,9 @@ def _against_a_term(
     one = other.effects[0] if len(other.effects) == 1 else None
     if single.accounted and one is not None and not one.listed:
         if gain > least:
-            return _in_their_place(search, found, further, single, gain)
+            return _in_their_place(search, further, single, gain)
         if len(found.effects) > 1 and abs(gain) < CRITERIA.decisive:
-            _rival_of_all(search, found, final, single, other)
+            _rival_of_all(search, final, single)
     if not chosen.effects:
         preferred = single.chosen
         if single.accounted and preferred is not None and preferred.effects:
@@ -152,29 +144,19 @@ def _against_a_term(
             if several is not None:
                 return _beside(several, found)
     if len(found.effects) == 1 and doubt.rivals:
-        _name_terms(search, found, final, single, other)
+        _name_terms(search, final, single)
     return found
 
 
-def _in_their_place(
-    search: Search, found: Diagnosis, further: Search, single: Search, gain: float
-) -> Diagnosis:
-    """A single term's diagnosis, which explains more than effects with names do.
-
-    Args:
-        search: of the effects with a name.
-        found: its diagnosis.
-        further: a search of these and all terms.
-        single: the search that found the term.
-        gain: of the term over them in the criterion.
-    """
-    other = single.found
-    assert other is not None
+def _in_their_place(search: Search, further: Search, single: Search, gain: float) -> Diagnosis:
+    """The diagnosis of a search for one term, which gains so much over effects with names."""
+    found, other = search.found, single.found
+    assert found is not None and other is not None
     if gain < CRITERIA.decisive:
         for names_of in other.rivals.values():
             names_of += [effect.name for effect in found.effects]
     elif len(found.effects) == 1:
-        _name(single, other, other.effects[0], search, found.effects[0])
+        _name(single, other.effects[0], search, found.effects[0])
     if single.doubtful_noise:
         several = _several(further, other.criterion_after)
         if several is not None:
@@ -210,18 +192,16 @@ def _beside(further: Diagnosis, found: Diagnosis) -> Diagnosis:
     return further
 
 
-def _name_terms(
-    search: Search, found: Diagnosis, final: Model, single: Search, other: Diagnosis
-) -> None:
+def _name_terms(search: Search, final: Model, single: Search) -> None:
     """Name terms without a formula as rivals of a diagnosis' one listed effect.
 
     Args:
         search: of the effects with a name.
-        found: its diagnosis.
         final: its model, weighed as terms are.
         single: the search for one term.
-        other: what that found.
     """
+    found, other = search.found, single.found
+    assert found is not None and other is not None
     (own,) = found.effects
     for candidate in (c for c in other.candidates if c.fit is not None):
         model = next(m for m in single.singles if m.effects == (candidate.effect,))
@@ -229,21 +209,18 @@ def _name_terms(
         candidate.criterion = found.criterion_after + model.criterion - final.criterion
         found.candidates.append(candidate)
         if near(single.models, model, final, shapes=True):
-            _name(search, found, own, single, candidate.effect)
+            _name(search, own, single, candidate.effect)
 
 
-def _rival_of_all(
-    search: Search, found: Diagnosis, final: Model, single: Search, other: Diagnosis
-) -> None:
+def _rival_of_all(search: Search, final: Model, single: Search) -> None:
     """Name a single term as a rival of the listed effects that it explains together.
 
     What is given is as for ``_name_terms``, but of several effects.
     """
+    found, other = search.found, single.found
+    assert found is not None and other is not None
     (rival,) = other.effects
-    if len(found.pairs) < CRITERIA.pairs:
-        mine = nearest_forms(search.models.forms[frozenset(found.effects)])
-        its = nearest_forms(single.models.forms[frozenset({rival})])
-        found.pairs.append((found.effects[0].name, mine, rival.name, its))
+    _to_be_parted(search, found.effects, single, rival)
     candidate = next(c for c in other.candidates if c.effect is rival)
     candidate.criterion = found.criterion_after + other.criterion_after - final.criterion
     found.candidates.append(candidate)
@@ -251,10 +228,17 @@ def _rival_of_all(
         names.append(rival.name)
 
 
-def _name(search: Search, found: Diagnosis, own: Effect, another: Search, rival: Effect) -> None:
+def _name(search: Search, own: Effect, another: Search, rival: Effect) -> None:
     """Name what another search has found as a rival of an effect of a search's diagnosis."""
-    found.rivals[own.name].append(rival.name)
-    if len(found.pairs) < CRITERIA.pairs:
-        mine = nearest_forms(search.models.forms[frozenset({own})])
+    assert search.found is not None
+    search.found.rivals[own.name].append(rival.name)
+    _to_be_parted(search, [own], another, rival)
+
+
+def _to_be_parted(search: Search, own: Sequence[Effect], another: Search, rival: Effect) -> None:
+    """Effects of a search's diagnosis and a rival, for which a further test is looked for."""
+    assert search.found is not None
+    if len(search.found.pairs) < CRITERIA.pairs:
+        mine = nearest_forms(search.models.forms[frozenset(own)])
         its = nearest_forms(another.models.forms[frozenset({rival})])
-        found.pairs.append((own.name, mine, rival.name, its))
+        search.found.pairs.append((own[0].name, mine, rival.name, its))

@@ -63,7 +63,9 @@ def read_folder(folder: Path, kinds: Sequence[Kind]) -> Measurement:
         holdout = entry.role == "holdout"
         runs.append(Run(entry.file, holdout, entry.label, columns, entry.specimen, own))
     noise = getattr(keys.noise, kind.quantity)
-    largest = max(float(np.nanmax(np.abs(run.columns[kind.quantity]))) for run in runs)
+    # Of a run there may be none, only what is measured besides.
+    every = np.abs(np.concatenate([run.columns[kind.quantity] for run in runs]))
+    largest = float(np.fmax.reduce(every, initial=0.0))
     if noise is not None and noise < LEAST_NOISE * largest:
         raise InputError(
             f"{path}: noise.{kind.quantity}: {noise:g} beside readings of up to {largest:g}, "

@@ -126,9 +126,7 @@ CANTILEVER_EFFECTS = (
         "cantilever",
         "the clamp yields: a rotation spring at the root",
         (
-            StripVariant(
-                "linear", (COMPLIANCE,), slope=lambda p, root: p["compliance_rad_per_N"] * root
-            ),
+            StripVariant("linear", (COMPLIANCE,), slope=lambda p, root: p[COMPLIANCE.name] * root),
             StripVariant("power", (COMPLIANCE, IN_PROPORTION, EXPONENT), slope=_by_a_power),
         ),
         of_fabric=False,
