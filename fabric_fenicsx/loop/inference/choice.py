@@ -32,6 +32,7 @@ def chosen_model(judge: Judge, levels: Sequence[Sequence[Model]], *, terms: bool
         beaten = min(more, default=float("inf")) < level[0].criterion - by
         # What is left may be due to the form of an effect rather than to another one.
         doubtful = unlike or (terms and judge.doubtful_noise(level[0]))
+        doubtful |= judge.differ_in_their_way(level[0])
         enough = count and not doubtful and judge.enough(level[0], levels[0][0])
         if beaten and not enough:
             continue

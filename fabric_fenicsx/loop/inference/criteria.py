@@ -72,6 +72,8 @@ class Criteria:
             single one, where more is looked for; convention.
         glimpsed: of which one form is fitted to find those; convention.
         other_forms: of the best effect, beside which others are tried as well; made-up.
+        other_effects: without a formula, of one variable, beside which others are tried as they are
+            beside the best one; made-up.
         exchanges: times that effects of the best pair are replaced in turn, if that changes it;
             convention.
         most_terms: in one model, terms without a formula among them; convention.
@@ -90,6 +92,8 @@ class Criteria:
         worthwhile: those that leave no more than this many times what the best one does; made-up.
         hopeless: sigmas of a reading that several effects leave, to first order, beyond which they
             are not fitted where a single term without a formula leaves noise; made-up.
+        half_again: times what such a term leaves that two effects leave, beyond which no three are
+            fitted; made-up.
         far_off: a first start of a form that leaves this many times more than the best start, to
             first order, is not followed; made-up.
         second_start: ... nor a second start that leaves this many times more; made-up.
@@ -130,6 +134,7 @@ class Criteria:
     glimpsed: int = 16
     exchanges: int = 3
     other_forms: int = 1
+    other_effects: int = 1
     most_terms: int = 2
     as_little: float = 1.02
     without_formula: float = 3.0
@@ -144,6 +149,7 @@ class Criteria:
     first_look: int = 12
     worthwhile: float = 30.0
     hopeless: float = 3.0
+    half_again: float = 1.5
     far_off: float = 30.0
     second_start: float = 4.0
 

@@ -308,6 +308,19 @@ class Judge:
         """
         return self._unusual(model, {p.name for p in self.experiment.baseline})
 
+    def differ_in_their_way(self, model: Model) -> bool:
+        """Whether specimens beside an effect, each tested in a way of its own, differ visibly.
+
+        By more than the noise, that is: what they differ by may be a further effect, which is as
+        much of a claim.
+        """
+        if not (self.experiment.each_its_own_way and model.effects and model.fit.deviations):
+            return False
+        rows, weight = model.fit.used, self._readings.weight
+        alike = linearised(self.experiment, model.fit).residual
+        apart = (alike - model.fit.residual[rows]) * weight[rows]
+        return bool(np.sqrt(np.mean(apart**2)) > self.misfit(model).noise)
+
     def _unusual(self, model: Fit, groups: Iterable[str]) -> bool:
         usual = CRITERIA.significant * CRITERIA.usual_scatter
         return any(model.variances.scatter.get(group, 0.0) > usual for group in groups)

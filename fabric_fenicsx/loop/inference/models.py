@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -9,8 +10,8 @@ import numpy as np
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Effect, Variant
-from .experiment import Experiment, each_by_itself
-from .fitting import Fit, fit, parameters_of
+from .experiment import Experiment, Flags, each_by_itself
+from .fitting import Fit, fit, parameters_of, soft_size
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise
 from .starts import SMALL, Combination, around_jumps, fit_combinations
@@ -28,6 +29,9 @@ MOST_NEAR, OF_A_SET = 6, 2
 REFINED = 3
 #: ... if their criterion is within this of the best.
 REFINED_WITHIN = 60.0
+#: Noise over what it was taken to be for the first fits, below which these are looked at again; how
+#: many are, and how many of a set of effects.
+QUIETER, AGAIN, AGAIN_OF_A_SET = 0.8, 12, 4
 #: Difference of criteria below which the simpler model is the better one: another form that has a
 #: parameter on its bound is the same model.
 AS_GOOD = 1.0
@@ -51,6 +55,8 @@ class Models:
         self.experiment, self.effects = experiment, list(effects)
         self.judge = Judge(experiment, self.effects)
         self.forms: dict[frozenset[Effect], list[Fit]] = {}
+        #: Models that were fitted again with their own variances.
+        self._refined: set[Model] = set()
         self.start = {p.name: p.starts[0] for p in experiment.baseline}
         self.variances = self._first_variances()
         fitted = self.baseline(self.start)
@@ -232,12 +238,84 @@ class Models:
                 break
             if rest[0].criterion > best + REFINED_WITHIN or len(refined) >= 2 * REFINED:
                 break
-            model = self.refined(rest.pop(0))
+            model = rest.pop(0)
+            if model not in self._refined:
+                model = self.refined(model)
+                self._refined.add(model)
             # Another start that leads to the same place.
             same = [m for m in rest if m.fit.variants == model.fit.variants]
             rest = [m for m in rest if m not in same or m.criterion < model.criterion - 1.0]
             refined.append(model)
         return _simplest_first(sorted(refined, key=lambda m: m.criterion)) + rest
+
+    def ranked(self, found: Sequence[Fit]) -> list[Model]:
+        """Fits as models with their own noise and scatter, the best first; see weighed.
+
+        What the baseline has wrong looks like slow noise, and hides in what forms of an effect
+        differ. With noise as the best of them leaves it they are looked at, and the nearest ones
+        fitted, again.
+        """
+        level = self.best_refined(self.weighed(found))
+        if not level:
+            return level
+        before, rows = self.variances, level[0].fit.used
+        self.take_noise_from(level[0].fit)
+        try:
+            sizes = [
+                v.noise.typical(self.experiment.readings, rows) for v in (self.variances, before)
+            ]
+            if sizes[0] > QUIETER * sizes[1]:
+                return level
+            nearest = [(one, self.variances) for one in self._nearest_now(found, rows)]
+            again = [one for one in self._each_again(nearest, CRITERIA.far) if not cancelling(one)]
+            return self.best_refined([*level, *self.weighed(again)])
+        finally:
+            self.variances = before
+
+    def _nearest_now(self, found: Sequence[Fit], rows: Flags) -> list[Fit]:
+        """Of some fits the nearest ones, with noise as it is taken to be now; one of each form."""
+        whiten = self.variances.noise.whitener(self.experiment.readings, rows)
+        sizes: dict[tuple[Variant, ...], tuple[float, Fit]] = {}
+        for one in found:
+            size = soft_size(whiten(one.residual[rows]), CRITERIA.far) + one.penalty
+            size += self.judge.cost(one, self.effects_of(one))
+            known = sizes.get(one.variants)
+            if not nothing_left(one) and (known is None or size < known[0]):
+                sizes[one.variants] = (size, one)
+        taken: list[Fit] = []
+        seen: Counter[frozenset[Effect]] = Counter()
+        for _, one in sorted(sizes.values(), key=lambda each: each[0]):
+            own = frozenset(self.effects_of(one))
+            if seen[own] < AGAIN_OF_A_SET and len(taken) < AGAIN:
+                seen[own] += 1
+                taken.append(one)
+        return taken
+
+    def _each_again(
+        self, models: Sequence[tuple[Fit, Variances]], robust: float | None = None
+    ) -> list[Fit]:
+        """Models fitted again from where they are, with these variances, those with a solution."""
+        rows = self.judge.rows
+
+        def again(one: tuple[Fit, Variances]) -> Fit | None:
+            model, variances = one
+            try:
+                return fit(
+                    self.experiment,
+                    model.variants,
+                    model.values,
+                    rows,
+                    variances,
+                    deviations=model.deviations,
+                    robust=robust,
+                )
+            except SolveError:
+                return None
+
+        known = [self.experiment.readings, rows]
+        for model, variances in models:
+            known += [model, variances, *model.variants]
+        return [one for one in each_by_itself(self.experiment, again, models, known) if one]
 
     def with_other_readings(self, levels: Sequence[Sequence[Model]]) -> list[list[Model]]:
         """Models by their number of effects, fitted to the readings that are left in now.
@@ -253,7 +331,7 @@ class Models:
     def _again_with(
         self, level: Sequence[Model], known: Mapping[frozenset[Effect], Sequence[Fit]]
     ) -> list[Model]:
-        found: dict[tuple[Variant, ...], Fit] = {}
+        first_of: dict[tuple[Variant, ...], tuple[Fit, Variances]] = {}
         best = level[0].criterion
         taken: list[Model] = []
         for model in level:
@@ -263,22 +341,11 @@ class Models:
         for model in taken:
             own = frozenset(model.effects)
             for old in (model.fit, *nearest_forms(known.get(own, ()))):
-                if old.variants in found:
-                    continue
-                try:
-                    new = fit(
-                        self.experiment,
-                        old.variants,
-                        old.values,
-                        self.judge.rows,
-                        model.estimate.variances,
-                        deviations=old.deviations,
-                    )
-                except SolveError:
-                    continue
-                found[old.variants] = new
-                self.forms.setdefault(own, []).append(new)
-        return self.best_refined(self.weighed(list(found.values())))
+                first_of.setdefault(old.variants, (old, model.estimate.variances))
+        found = self._each_again(list(first_of.values()))
+        for new in found:
+            self.forms.setdefault(frozenset(self.effects_of(new)), []).append(new)
+        return self.best_refined(self.weighed(found))
 
     def by_strength(self, model: Model) -> tuple[Effect, ...]:
         """Effects of a model, that first which changes the expected readings most."""
@@ -293,7 +360,11 @@ class Models:
 
         if len(model.effects) < 2:
             return model.effects
-        return tuple(sorted(model.effects, key=change, reverse=True))
+        try:
+            return tuple(sorted(model.effects, key=change, reverse=True))
+        except SolveError:
+            # What specimens have in common, or that without an effect, has no solution.
+            return model.effects
 
 
 def _simplest_first(models: list[Model]) -> list[Model]:

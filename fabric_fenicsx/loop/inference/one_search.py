@@ -62,12 +62,14 @@ class Search:
         #: Models of one effect, the best first.
         self.singles: Sequence[Model] = ()
         #: Asked, where one effect does not do, whether another search has found what does.
-        self.gives_way: Callable[[], bool] = lambda: False
+        self.gives_way: Callable[[Model], bool] = lambda nearest: False
         self.gave_way = False
         #: What was found so far.
         self.found: Diagnosis | None = None
         #: Effects that every other one was tried beside.
         self._tried: set[frozenset[Effect]] = set()
+        #: Forms of those that it was when several were first tried together.
+        self._added_to_these: set[frozenset[Variant]] = set()
         #: Effects that were tried in all their forms, and the forms beside which they were.
         self._in_all_forms: set[tuple[Effect, frozenset[Variant]]] = set()
         self._kept_screen: Kept[Screen] = Kept(1)
@@ -161,14 +163,20 @@ class Search:
         self._one_by_one = (candidates, [list(level) for level in found[:2]])
         return found
 
-    def finds_what_several_do_not(self) -> bool:
-        """Whether a single term leaves noise, where effects with names leave far more together."""
+    def finds_what_several_do_not(self, nearest: Model) -> bool:
+        """Whether a single term leaves noise, where effects with names leave far more together.
+
+        To first order, before any are fitted together, or as the nearest model of two shows.
+        """
         if self.found is None:
             self.run()
         found = self.found
         assert found is not None
         if found.verdict != "effect_discovered" or len(found.effects) != 1 or not self.accounted:
             return False
+        if len(nearest.effects) > 1:
+            left = nearest.fit.rms(nearest.fit.used) / found.final.rms(found.final.used)
+            return left > CRITERIA.half_again
         base, variances = self.models.base, found.final.variances
         linear = ToFirstOrder(self.experiment, base, variances, None)
         listed = {e: forms for e, forms in self._signatures.items() if e.listed}
@@ -188,22 +196,20 @@ class Search:
             best = _nearest(levels)
             if not levels[-1] or self._settled(best, levels[0][0]):
                 break
-            if count == 2:
-                self.gave_way = self.gives_way()
-                if self.gave_way:
-                    break
+            self.gave_way = self.gives_way(best)
+            if self.gave_way:
+                break
             self.progress(0.5 + 0.15 * (count - 2), f"fit {count} effects together")
             # With noise as the best model leaves it.
             self.models.take_noise_from(best.fit)
             self.models.base = self.models.baseline(self.models.base.values)
-            fewer = self.models.with_these_variances(levels[-1][0])
-            levels.append(self._together(count, fewer))
+            levels.append(self._together(count, levels[-1]))
             if self._screened_first and levels[-1]:
                 # Before others take the place of what is only in the wrong form.
                 self._in_other_forms(levels)
             self._with_one_less(levels)
             if self._screened_first and levels[-1]:
-                self._exchanged(levels, fewer)
+                self._exchanged(levels)
                 self._in_other_forms(levels)
             # With an effect of which nothing is left it is a model of fewer, which is among those.
             levels[-1] = [m for m in levels[-1] if not nothing_left(m.fit)]
@@ -234,7 +240,7 @@ class Search:
             found += self.models.fitted(own, starts=2)
             alike += self.models.with_alike_specimens(own)
         # Sizes of fits that allow for specimens and of those that do not are not compared.
-        singles = self.models.weighed(found) + self.models.weighed(alike)
+        singles = self.models.ranked(found) + self.models.weighed(alike)
         levels.append(self.models.best_refined(singles))
         if self._screened_first and not self._settled(_nearest(levels), levels[0][0]):
             ranked = screen.most_promising(len(tried) + CRITERIA.glimpsed)
@@ -253,7 +259,7 @@ class Search:
         Of terms only where their noise is not in doubt. And where specimens differ unusually, or
         each was tested in a way of its own, what they differ by may be a further effect.
         """
-        if not self.judge.settled(model, baseline):
+        if not self.judge.settled(model, baseline) or self.judge.differ_in_their_way(model):
             return False
         if self._screened_first:
             return not self.judge.doubtful_noise(model)
@@ -286,7 +292,7 @@ class Search:
         found: list[Fit] = []
         for effect in sorted(left, key=lambda one: left[one])[: CRITERIA.products]:
             found += self.models.fitted(_by_itself(signs[effect]), starts=1)
-        return self.models.best_refined(self.models.weighed(found))
+        return self.models.ranked(found)
 
     def _signed(self, effects: Sequence[Effect]) -> Signatures:
         """The baseline's sensitivities to each form of some effects."""
@@ -318,9 +324,16 @@ class Search:
         return self._beside(model, others)
 
     def _beside(self, model: Fit, effects: Sequence[Effect]) -> list[Combination]:
-        """Every form of some effects, about a model."""
+        """Every form of some effects, about a model of specimens that are alike.
+
+        None where there is no such model: as specimens differ some of them may have a solution
+        that what they have in common has not.
+        """
         values = set(model.values)
-        expected, slopes = self.experiment.predict(model.variants, model.values)
+        try:
+            expected, slopes = self.experiment.predict(model.variants, model.values)
+        except SolveError:
+            return []
         forms = [
             variant
             for effect in effects
@@ -339,22 +352,36 @@ class Search:
             for shape in shapes
         ]
 
-    def _together(self, count: int, fewer: Fit) -> list[Model]:
+    def _together(self, count: int, level: Sequence[Model]) -> list[Model]:
         """Models of several effects, the best first.
 
         Args:
             count: of effects.
-            fewer: the best model of one effect less.
+            level: models of one effect less, the best first.
         """
         combinations = self._screened().best(CRITERIA.combinations, count)
         fits = self.models.fitted(combinations, starts=1)
-        most = CRITERIA.terms if self._screened_first else None
-        # Terms, of which there are many, are tried in their forms when they are found.
-        others = [] if self._screened_first or count > 2 else self._other_forms(fewer)
-        starts = 2 if others else 1
+        fewer = self.models.with_these_variances(level[0])
+        starts, most = 1, None
+        if self._screened_first:
+            # Terms, of which there are many, are tried in their forms when they are found.
+            others, most = self._other_effects(level), CRITERIA.terms
+        else:
+            others = [] if count > 2 else self._other_forms(fewer)
+            starts = 2 if others else 1
+        self._added_to_these = {frozenset(one.variants) for one in (fewer, *others)}
         for base in (fewer, *others):
             fits += self.models.fitted(self._added_to(base), starts=starts, base=base, most=most)
-        return self.models.best_refined(self.models.weighed(fits))
+        return self.models.ranked(fits)
+
+    def _other_effects(self, level: Sequence[Model]) -> list[Fit]:
+        """What comes next to the best of a level by itself, of terms that go by one variable.
+
+        The best one may do some of the work of two, neither of which is then seen beside it.
+        """
+        best = set(level[0].effects)
+        others = [m for m in level if not best & set(m.effects) and not m.effects[0].of_two]
+        return [self.models.with_these_variances(m) for m in others[: CRITERIA.other_effects]]
 
     def _other_forms(self, model: Fit) -> list[Fit]:
         """The best fits of the same effects in other forms.
@@ -389,7 +416,7 @@ class Search:
         new = [f for f in found if f.variants not in tried]
         levels[-2] = self.models.best_refined([*levels[-2], *self.models.weighed(new)])
 
-    def _exchanged(self, levels: list[list[Model]], first: Fit) -> None:
+    def _exchanged(self, levels: list[list[Model]]) -> None:
         """The best model of the last level with each effect in turn replaced by any other.
 
         What was added to the best model of one effect less stands for what that one has wrong; and
@@ -397,9 +424,8 @@ class Search:
 
         Args:
             levels: models by their number of effects, which more are added to.
-            first: what everything was added to already.
         """
-        tried = {frozenset(first.variants)}
+        tried = set(self._added_to_these)
         for _ in range(CRITERIA.exchanges):
             whole = levels[-1][0].fit.variants
             kept = [frozenset(whole) - {out} for out in whole]

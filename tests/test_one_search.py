@@ -1,0 +1,138 @@
+"""What one search looks at: forms again once noise is known better, and what has no solution."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from linear import Linear, linear_effect, readings
+
+from fabric_fenicsx.errors import SolveError
+from fabric_fenicsx.inputs.parameters import Parameter
+from fabric_fenicsx.loop.inference.effects import Effect, Variant
+from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
+from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.models import Models
+from fabric_fenicsx.loop.inference.noise import Noise
+from fabric_fenicsx.loop.inference.one_search import Search
+from fabric_fenicsx.loop.inference.variances import Variances
+
+RUNS, EACH = 4, 150
+
+
+def made(columns, expected, effects, cls=Linear, **more):
+    """A test of some runs with a slope and a zero of their own besides."""
+    t = np.tile(np.linspace(0.0, 1.0, EACH), RUNS)
+    run = np.repeat(np.arange(RUNS), EACH)
+    noise = 0.02 * np.random.default_rng(5).normal(size=len(t))
+    observed = 10.0 + 2.0 * t + expected(t) + noise
+    base = {"a": np.ones_like(t), "b": t}
+    own = {name: of(t) for name, of in columns.items()}
+    return cls(readings(observed, run=run, **more), base | own, ("a", "b"), effects=effects)
+
+
+def search(test):
+    """A search for its effects, that has been made."""
+    found = Search(test, test.effects, lambda done, what: None)
+    found.run()
+    return found
+
+
+def test_forms_are_looked_at_again_when_noise_is_known():
+    """Beside slow noise of 1 what two short forms lack is nothing; beside what is left it is."""
+
+    def wave(t):
+        return np.sin(80.0 * t)
+
+    columns = {
+        "near": wave,
+        "nearer": lambda t: wave(t) + 0.01 * np.sin(7.0 * t),
+        "part0": wave,
+        "part1": lambda t: np.sin(9.0 * t),
+        "part2": lambda t: np.cos(15.0 * t),
+        "part3": lambda t: np.sin(21.0 * t),
+    }
+    whole = tuple(Parameter(f"part{k}", amplitude=True) for k in range(4))
+    forms = [Variant(name, (Parameter(name, amplitude=True),)) for name in ("near", "nearer")]
+    effect = Effect("wave", "linear", "", (*forms, Variant("all", whole)))
+    sizes = {"part0": 1.2, "part1": 0.06, "part2": 0.06, "part3": 0.06}
+    test = made(
+        columns, lambda t: sum(size * columns[name](t) for name, size in sizes.items()), [effect]
+    )
+    models = Models(test, [effect])
+    models.variances = loud = Variances(Noise(1.0, correlation=0.9))
+    start = {"a": 10.0, "b": 2.0} | dict.fromkeys(columns, 0.5)
+    fits = [fit(test, (form,), start, test.readings.fit, loud) for form in effect.variants]
+    at_first = models.best_refined(models.weighed(fits))
+    assert {m.fit.variants[0].label for m in at_first} == {"near", "nearer"}
+    assert models.ranked(fits)[0].fit.variants[0].label == "all"
+    assert models.variances is loud, "which other fits are compared by"
+
+
+class OnlyAsSpecimensDiffer(Linear):
+    """Has no solution for specimens that are alike where there is much of an effect."""
+
+    def predict(self, variants, values, deviations=NO_DEVIATIONS):
+        if values.get("wave", 0.0) > 0.3 and not deviations:
+            raise SolveError("a strip finds no balance")
+        return super().predict(variants, values, deviations)
+
+
+def test_nothing_is_added_to_what_has_no_solution_for_specimens_that_are_alike():
+    columns = {"wave": lambda t: np.sin(9.0 * t), "kink": lambda t: np.maximum(t - 0.6, 0.0)}
+    effects = [linear_effect(name) for name in columns]
+    test = made(
+        columns,
+        lambda t: np.sin(9.0 * t) + 3.0 * np.maximum(t - 0.6, 0.0),
+        effects,
+        OnlyAsSpecimensDiffer,
+    )
+    found = search(test)
+    assert found.found is not None, "the search ends with an answer"
+
+
+@pytest.mark.parametrize(
+    ("own_way", "apart", "settled"), [(True, 0.1, False), (True, 0.005, True), (False, 0.1, True)]
+)
+def test_what_specimens_visibly_differ_by_may_be_a_further_effect(own_way, apart, settled):
+    """Where each was tested in a way of its own; what noise hides of it is none."""
+    shift = np.repeat(apart * np.array([1.0, -1.0, 0.5, -0.5]), EACH)
+    columns = {"kink": lambda t: np.maximum(t - 0.6, 0.0)}
+    test = made(columns, lambda t: 3.0 * columns["kink"](t) + shift, [linear_effect("kink")])
+    test.each_its_own_way = own_way
+    own = search(test)
+    rows, start = test.readings.fit, {"a": 10.0, "b": 2.0}
+    (effect,) = test.effects
+    scatter = Variances(Noise(0.02), {"a": 0.01})
+    model, without = (
+        own.judge.weighed(fit(test, forms, start | {"kink": 3.0}, rows, scatter), effects)
+        for forms, effects in ((effect.variants, (effect,)), ((), ()))
+    )
+    assert model.fit.deviations
+    assert own._settled(model, without) is settled
+
+
+@pytest.mark.parametrize(("times", "gives_way"), [(1.4, False), (1.6, True)])
+def test_three_effects_are_not_fitted_where_a_term_leaves_far_less_than_two(times, gives_way):
+    test = made({"kink": lambda t: t**2}, lambda t: 3.0 * t**2, [linear_effect("kink")])
+    further = search(test)
+    assert further.accounted
+    final = further.found.final
+    further.found = SimpleNamespace(verdict="effect_discovered", effects=["kink"], final=final)
+    two = SimpleNamespace(
+        effects=("one", "other"), fit=replace(final, residual=times * final.residual)
+    )
+    assert further.finds_what_several_do_not(two) is gives_way
+
+
+def test_more_is_added_to_the_next_term_of_one_variable_as_well():
+    effects = [
+        replace(linear_effect(name), of_two=name == "product")
+        for name in ("best", "product", "other")
+    ]
+    best, of_two, other = (SimpleNamespace(effects=(effect,)) for effect in effects)
+    same = SimpleNamespace(effects=best.effects)
+    test = made({"kink": lambda t: t**2}, lambda t: 3.0 * t**2, [linear_effect("kink")])
+    own = search(test)
+    own.models.with_these_variances = lambda model: model
+    assert own._other_effects([best, of_two, same, other]) == [other]
