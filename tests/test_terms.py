@@ -368,13 +368,14 @@ def travels(*corners):
     return gamma, FRAME * (2 * np.cos(theta) - math.sqrt(2.0))
 
 
-def write(folder, wear, permanent=0.0, guide=0.0, below=0.0, warms=0.0):
+def write(folder, wear, permanent=0.0, guide=0.0, below=0.0, warms=0.0, hooks=0.0):
     """Two fitted runs and one held out.
 
     Of the elastic moment, wear (1 − e^(−path/0.6)) is lost, its state of rest is at
     ``permanent`` max(γ_max − 0.2, 0), and a guide rubs with ``guide`` [N] at 25 ± 8 mm. Below the
     largest angle the moment is less by ``below`` γ_max sin²(πγ/γ_max). A load cell that warms up
-    begins at ``warms`` [N], of which e^(−t/60 s) is left.
+    begins at ``warms`` [N], of which e^(−t/60 s) is left. Tows hook at 0.25 rad with ``hooks`` [N],
+    of which e^(−path/0.25) is left.
     """
     folder.mkdir(parents=True)
     rng = np.random.default_rng(5)
@@ -394,6 +395,7 @@ def write(folder, wear, permanent=0.0, guide=0.0, below=0.0, warms=0.0):
         m = elastic * (1.0 - wear * (1.0 - np.exp(-path / 0.6))) + C1 * rate
         largest = np.maximum.accumulate(np.maximum(gamma, 1e-9))
         m = m - below * largest * np.sin(np.pi * gamma / largest) ** 2
+        m = m + hooks * np.exp(-(((gamma - 0.25) / 0.06) ** 2) - path / 0.25)
         force = m * FABRIC**2 / (FRAME * np.sin(np.pi / 4 - gamma / 2))
         force = force + warms * np.exp(-time / 60.0)
         force = force + guide * np.sign(np.gradient(D)) * np.exp(-(((D - 25.0) / 8.0) ** 2))
@@ -556,6 +558,27 @@ def test_a_term_over_two_variables_leaves_noise(tmp_path):
     assert_same_moments(tmp_path / "two.py", variant, found.values)
 
 
+def test_a_hook_that_wears_leaves_noise(tmp_path):
+    """Powers of the path, for what fades with it, leave more; the term's file is that term."""
+    experiment = PictureFrame([read_measurement(write(tmp_path / "set", 0.0, hooks=0.1))])
+    name, start = "odd_moment_of_angle_and_path", {"k1_N": K1, "k3_N": K3, "c1_N_s": C1}
+    (term,) = (t for t in experiment.terms if t.name == name)
+    rows, holdout = experiment.readings.fit, experiment.readings.holdout
+
+    def fitted(label):
+        variant = next(v for v in term.variants if v.label == label)
+        own = {p.name: p.starts[len(p.starts) // 2] for p in variant.parameters if p.starts}
+        own |= {p.name: 1e-3 for p in variant.parameters if not p.starts}
+        return variant, fit(experiment, (variant,), start | own, rows, Variances(Noise(NOISE)))
+
+    assert fitted("angle, bump, powers 0, 1, 2 of path")[1].rms(rows) > 1.3 * NOISE
+    variant, found = fitted("angle, bump that fades with the path")
+    assert found.rms(rows) < 1.1 * NOISE and found.rms(holdout) < 1.1 * NOISE
+    two = Discovered("two", term, variant, found.values, pd.DataFrame(), "")
+    (tmp_path / "two.py").write_text(effect_file(two, "made up"))
+    assert_same_moments(tmp_path / "two.py", variant, found.values)
+
+
 @pytest.mark.slow
 def test_a_term_over_two_variables_is_discovered(tmp_path):
     """With both its variables, its table over them, and a picture of it."""
@@ -677,6 +700,37 @@ def test_what_is_at_one_angle_comes_with_a_history(also, history):
     y, zero = (np.minimum(np.abs(PATH) / 0.7, 1.0) - 0.4) / 0.2, -2.0
     bump = (1.0 + 0.3 * y) * np.exp(-(y**2)) - (1.0 + 0.3 * zero) * np.exp(-(zero**2))
     expected = np.sign(PATH) * (w + 0.5 * w**2) * bump
+    assert marched(law, PATH)[0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("course", "place", "of"),
+    [
+        ("saturation", 0.5, lambda w: 1.0 - np.exp(-w / 0.2)),
+        ("step", 0.6, lambda w: 1 / (1 + np.exp(-(w - 0.6) / 0.2)) - 1 / (1 + np.exp(0.6 / 0.2))),
+    ],
+)
+def test_what_is_at_one_angle_fades_or_ends_with_a_history(course, place, of):
+    """(1 − 0.8 c) times a bump over the angle, c being the course of the path."""
+    path = np.cumsum(np.abs(np.diff(PATH, prepend=0.0)))
+    law = ShapedLaw(
+        "odd",
+        "angle",
+        reach=0.7,
+        coefficients=(1.0, 0.0, -0.8, 0.0),
+        shape="bump",
+        place=0.4,
+        width=0.2,
+        also="path",
+        also_reach=2.0,
+        powers=(0, 1),
+        course=course,
+        course_place=place,
+        course_width=0.2,
+    )
+    y = (np.abs(PATH) / 0.7 - 0.4) / 0.2
+    bump = np.exp(-(y**2)) - np.exp(-4.0)
+    expected = np.sign(PATH) * (1.0 - 0.8 * of(path / 2.0)) * bump
     assert marched(law, PATH)[0] == pytest.approx(expected)
 
 

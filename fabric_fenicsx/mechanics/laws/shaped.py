@@ -47,6 +47,7 @@ Kind = Literal[
     "two bumps",
     "ringing",
 ]
+Course = Literal["saturation", "step"]
 Base = Literal[
     "elastic",
     "rest",
@@ -283,8 +284,14 @@ def product_of(
     place: Any = 0.5,
     width: Any = 0.1,
     drift: Any = 0.0,
+    course: str | None = None,
+    course_place: Any = 0.5,
+    course_width: Any = 0.1,
 ) -> Any:
     """A function of two variables, Σ_p w^p (a_p + f_p(x + v w)), w not negative.
+
+    So is what is at one place of x until w has come to one, or fades as w grows: then another
+    function of w, its course, stands for w in the powers.
 
     Args:
         kind: of all f_p; see ``shape_of``, as of what follows.
@@ -296,8 +303,12 @@ def product_of(
         place: x₀ of all f_p.
         width: likewise, of all f_p.
         drift: v, by how much f_p has moved along x where w is 1.
+        course: of w, a "step" or a "saturation" of size 1; None is w itself.
+        course_place: its x₀.
+        course_width: its width.
     """
     x = x + drift * w
+    w = w if course is None else shape_of(course, (1.0,), w, course_place, course_width)
     each = len(coefficients) // len(powers)
     value = 0
     for k, power in enumerate(powers):
@@ -341,6 +352,8 @@ class ShapedLaw(CrossingLaw):
         powers: p; ``coefficients`` has those of f_p for each in turn.
         constants: a_p, in the unit of the coefficients; none are all nothing.
         drift: by how much f_p has moved along v/v_max where w is w_max [-]; None stays.
+        course: of w/w_max in the powers, see ``product_of``; None is itself.
+        course_place, course_width: of that, as shares of w_max.
 
     Raises:
         ValueError: the numbers of coefficients, powers and constants do not go together.
@@ -368,6 +381,9 @@ class ShapedLaw(CrossingLaw):
     drift: Any = number(
         "drift", "of the shape along the variable, by the other one", float | None, None
     )
+    course: Course | None = number("course", "of the other variable", Course | None, None)
+    course_place: Any = number("course_place", "of a step, as a share of its reach", float, 0.5)
+    course_width: Any = number("course_width", "of its course, as a share of it", Positive, 0.1)
 
     law = "shaped"
 
@@ -428,7 +444,18 @@ class ShapedLaw(CrossingLaw):
         w = min_value(self._also_at(at) / at.number(self.also_reach), 1)
         drift = 0.0 if self.drift is None else at.number(self.drift)
         return constant + product_of(
-            self.shape, parts, x, w, tuple(self.powers), constants, place, width, drift
+            self.shape,
+            parts,
+            x,
+            w,
+            tuple(self.powers),
+            constants,
+            place,
+            width,
+            drift,
+            self.course,
+            at.number(self.course_place),
+            at.number(self.course_width),
         )
 
     def moment(self, at: Crossing) -> Any:

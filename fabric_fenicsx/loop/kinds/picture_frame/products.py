@@ -4,13 +4,15 @@ Of w, which is at hand at a crossing, each has a few powers, of v a shape, see p
 
     base · Σ_p (w/w_max)^p (a_p + f_p(v/v_max))
 
-What is at one angle alone, or begins at one, is there with w and v the other way round.
+What is at one angle alone, or begins at one, is there with w and v the other way round; such a
+thing may also fade with a history w, or be there until that has come to some value, 1 − e^(−w/d)
+or a step instead of w.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -19,9 +21,12 @@ from ...inference.effects import Effect, Shape
 from .shapes import (
     FORGETFUL,
     SQUARES,
+    STOP_WIDTHS,
+    STOPS,
     X,
     Y,
     bumps,
+    courses,
     fitted,
     moving,
     of_powers,
@@ -67,6 +72,12 @@ HISTORIES = ("largest_angle", "path", "time")
 
 GROWING = ((1,), (0, 1, 2))
 """Powers of a history in whose course something at an angle comes, or comes and goes."""
+
+IN_A_COURSE = ("odd", "viscous")
+"""Of what these forms are: a friction has many already."""
+
+COMES_OR_GOES = (0, 1)
+"""Of a course from 0 to 1: what is there before it, and what is more of that behind."""
 
 BY = (*HISTORIES, "relative_angle", "rate", "unloading", *FORGETFUL)
 
@@ -154,12 +165,44 @@ def _turned(
             if label in AT_AN_ANGLE and coefficients is not None:
                 own = fixed | numbers | {"powers": powers, "coefficients": coefficients}
                 yield _form(f"{kind.also}, {label}, {said}", own, "", None)
+    if kind.base in IN_A_COURSE:
+        for label, one, numbers in (*bumps(name), *shapes(name, 2)):
+            if label in AT_AN_ANGLE:
+                yield from _in_a_course(kind, name, words, label, one, fixed | numbers)
     if kind.base != "viscous":
         # A dashpot that depends on nothing is in the baseline.
         fixed["constants"] = (Parameter(f"{name}_0_0", amplitude=True),)
     for label, one, numbers in moving(name, WAVES, step=1.0):
         own = fixed | numbers | {"powers": (0,), "coefficients": one}
         yield _form(f"{kind.also}, {label} with the {words}", own, "", None)
+
+
+def _in_a_course(
+    kind: _Kind,
+    name: str,
+    words: str,
+    label: str,
+    one: Sequence[Any],
+    numbers: Mapping[str, Any],
+) -> Iterator[FrameVariant]:
+    """Forms of what is at an angle and fades with a history, or is there until that has come to.
+
+    Args:
+        kind: of the products.
+        name: of the term.
+        words: for the history.
+        label: of the shape over the angle.
+        one: its coefficients.
+        numbers: and its other ones.
+    """
+    # Of the many together fewer starts each.
+    place = replace(numbers["place"], starts=STOPS)
+    width = replace(numbers["width"], starts=STOP_WIDTHS)
+    coefficients = of_powers(name, COMES_OR_GOES, one)
+    about = {**numbers, "place": place, "width": width}
+    about |= {"powers": COMES_OR_GOES, "coefficients": coefficients}
+    for said, course in courses(name):
+        yield _form(f"{kind.also}, {label} {said} with the {words}", about | course, "", None)
 
 
 def _shapes(

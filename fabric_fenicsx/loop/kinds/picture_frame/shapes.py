@@ -23,6 +23,7 @@ __all__ = [
     "Y",
     "both_sides",
     "bumps",
+    "courses",
     "each_specimen",
     "factor",
     "fitted",
@@ -72,6 +73,8 @@ EDGES = (0.02,)
 #: are alike a period further, more of these.
 STOPS, STOP_WIDTHS, DRIFTS = (0.1, 0.3, 0.5, 0.7, 0.9), (0.1,), (-0.4, -0.12, 0.12, 0.4)
 WAVE_DRIFTS = (-0.6, -0.3, -0.15, -0.07, 0.07, 0.15, 0.3, 0.6)
+#: Where something fades with another variable, or up to where it is there, and how soon it ends.
+COURSES, UNTIL, SUDDEN = (0.05, 0.25), (0.3, 0.55, 0.8), 0.03
 #: How sharp a corner is.
 SHARPS = (0.02,)
 #: Decays of what begins somewhere.
@@ -178,10 +181,14 @@ def of_powers(
     )
 
 
+PRODUCTS = ("constants", "place", "width", "drift", "course", "course_place", "course_width")
+"""Numbers that ``product_of`` may have beside powers and coefficients."""
+
+
 def product(numbers: Mapping[str, Any], values: Values, x: Any, w: Any) -> Any:
     """What ``factor`` is of one variable, of two: at shares x and w of their reaches."""
     own = {key: valued(n, values) for key, n in numbers.items()}
-    more = {key: own[key] for key in ("constants", "place", "width", "drift") if key in own}
+    more = {key: own[key] for key in PRODUCTS if key in own}
     return product_of(own["shape"], own["coefficients"], x, w, own["powers"], **more)
 
 
@@ -341,6 +348,14 @@ def moving(name: str, cycles: float, step: float = STEP) -> Iterator[Drawn]:
     further = replace(drift, starts=WAVE_DRIFTS)
     for label, coefficients, numbers in waves(name, cycles, step=step):
         yield f"{label}, moving", coefficients, numbers | {"drift": further}
+
+
+def courses(name: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """What becomes of something with another variable: label and numbers; see product_of."""
+    fading = Parameter(f"{name}_course", COURSES, 0.005, 2.0)
+    yield "that fades", {"course": "saturation", "course_width": fading}
+    until = Parameter(f"{name}_until", UNTIL, 0.0, 1.0)
+    yield "until then", {"course": "step", "course_place": until, "course_width": SUDDEN}
 
 
 def both_sides(name: str) -> Iterator[tuple[str, dict[str, Any]]]:
