@@ -92,24 +92,36 @@ def test_nothing_is_added_to_what_has_no_solution_for_specimens_that_are_alike()
 
 
 @pytest.mark.parametrize(
-    ("own_way", "apart", "settled"), [(True, 0.1, False), (True, 0.005, True), (False, 0.1, True)]
+    ("own_way", "apart", "other", "settled"),
+    [
+        (True, 0.1, "lean", False),
+        (True, 0.1, "wave", True),
+        (True, 0.005, "lean", True),
+        (False, 0.1, "lean", True),
+    ],
 )
-def test_what_specimens_visibly_differ_by_may_be_a_further_effect(own_way, apart, settled):
-    """Where each was tested in a way of its own; what noise hides of it is none."""
-    shift = np.repeat(apart * np.array([1.0, -1.0, 0.5, -0.5]), EACH)
-    columns = {"kink": lambda t: np.maximum(t - 0.6, 0.0)}
-    test = made(columns, lambda t: 3.0 * columns["kink"](t) + shift, [linear_effect("kink")])
+def test_what_specimens_visibly_differ_by_may_be_a_further_effect(own_way, apart, other, settled):
+    """Where each was tested in a way of its own, and one leaves noise without such differences."""
+    shift = np.repeat(np.array([1.0, -1.0, 0.5, -0.5]), EACH)
+    columns = {
+        "kink": lambda t: np.maximum(t - 0.6, 0.0),
+        "lean": lambda t: shift,
+        "wave": lambda t: np.sin(7.0 * t) * shift,
+    }
+    effects = [linear_effect(name) for name in ("kink", other)]
+    test = made(columns, lambda t: 3.0 * columns["kink"](t) + apart * shift, effects)
     test.each_its_own_way = own_way
     own = search(test)
     rows, start = test.readings.fit, {"a": 10.0, "b": 2.0}
-    (effect,) = test.effects
+    effect = effects[0]
     scatter = Variances(Noise(0.02), {"a": 0.01})
     model, without = (
-        own.judge.weighed(fit(test, forms, start | {"kink": 3.0}, rows, scatter), effects)
-        for forms, effects in ((effect.variants, (effect,)), ((), ()))
+        own.judge.weighed(fit(test, forms, start | {"kink": 3.0}, rows, scatter), of)
+        for forms, of in ((effect.variants, (effect,)), ((), ()))
     )
     assert model.fit.deviations
     assert own._settled(model, without) is settled
+    assert own.may_be_one_more(model) is not settled
 
 
 @pytest.mark.parametrize(("times", "gives_way"), [(1.4, False), (1.6, True)])

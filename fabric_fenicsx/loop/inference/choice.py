@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from .criteria import CRITERIA
 from .diagnosis import Verdict
@@ -13,13 +13,20 @@ from .judge import Judge, Model
 __all__ = ["chosen_model", "in_place_of", "models_instead", "verdict_on"]
 
 
-def chosen_model(judge: Judge, levels: Sequence[Sequence[Model]], *, terms: bool) -> Model:
+def chosen_model(
+    judge: Judge,
+    levels: Sequence[Sequence[Model]],
+    *,
+    terms: bool,
+    may_be_one_more: Callable[[Model], bool],
+) -> Model:
     """The model of fewest effects that no other beats decisively, if it bears scrutiny.
 
     Args:
         judge: of all models.
         levels: models by their number of effects, none of them empty, the best first.
         terms: whether terms without a formula are among what was tried.
+        may_be_one_more: whether what specimens differ by in a model may be one more effect.
     """
     if judge.experiment.curves_only and judge.settled(levels[0][0], levels[0][0]):
         # Another curve would be no finding, and its lead turns with the last digits read.
@@ -32,7 +39,7 @@ def chosen_model(judge: Judge, levels: Sequence[Sequence[Model]], *, terms: bool
         beaten = min(more, default=float("inf")) < level[0].criterion - by
         # What is left may be due to the form of an effect rather than to another one.
         doubtful = unlike or (terms and judge.doubtful_noise(level[0]))
-        doubtful |= judge.differ_in_their_way(level[0])
+        doubtful |= beaten and may_be_one_more(level[0])
         enough = count and not doubtful and judge.enough(level[0], levels[0][0])
         if beaten and not enough:
             continue

@@ -152,6 +152,23 @@ class Models:
         finally:
             self.variances = allowed
 
+    def of_alike_specimens(self, model: Model) -> Fit:
+        """A model fitted with its own noise and specimens that hardly differ.
+
+        Raises:
+            SolveError: it has no solution.
+        """
+        found = model.fit
+        alike = dict.fromkeys(found.variances.scatter, ALIKE)
+        return fit(
+            self.experiment,
+            found.variants,
+            found.values,
+            found.used,
+            Variances(model.estimate.variances.noise, alike),
+            robust=CRITERIA.far,
+        )
+
     def effects_of(self, model: Fit) -> tuple[Effect, ...]:
         """Effects of a fitted model, in the order of its forms."""
         return tuple(self.effect_of(v) for v in model.variants)

@@ -29,6 +29,7 @@ from .notes import errors_beside, noise_source, notes_of
 from .rivals import pairs_of, rivals_of
 from .screen import Screen, Signatures
 from .starts import Combination, Signature, ToFirstOrder, signatures
+from .variances import Variances
 
 __all__ = ["Search"]
 
@@ -57,13 +58,15 @@ class Search:
         self.chosen: Model | None = None
         #: Whether noise is more than was stated for that, or slow.
         self.doubtful_noise = False
-        #: Whether specimens differ in it.
-        self.specimens_differ = False
+        #: Whether specimens differ in it, and may do so by a further effect.
+        self.specimens_differ = self.may_be_more = False
         #: Models of one effect, the best first.
         self.singles: Sequence[Model] = ()
         #: Asked, where one effect does not do, whether another search has found what does.
         self.gives_way: Callable[[Model], bool] = lambda nearest: False
         self.gave_way = False
+        #: Models whose specimens differ visibly, and whether one more effect may be all of that.
+        self._one_more: dict[Model, bool] = {}
         #: What was found so far.
         self.found: Diagnosis | None = None
         #: Effects that every other one was tried beside.
@@ -88,11 +91,14 @@ class Search:
             levels = self._with_other_readings(candidates, levels)
         baseline = levels[0][0]
         self.singles = levels[1] if len(levels) > 1 else ()
-        chosen = chosen_model(self.judge, levels, terms=self._screened_first)
+        chosen = chosen_model(
+            self.judge, levels, terms=self._screened_first, may_be_one_more=self.may_be_one_more
+        )
         verdict = verdict_on(self.judge, baseline, chosen)
         self.accounted = self.judge.accounts(chosen, baseline)
         self.doubtful_noise = self.judge.doubtful_noise(chosen)
         self.specimens_differ = bool(chosen.fit.deviations)
+        self.may_be_more = self.may_be_one_more(chosen)
         nearest = _nearest(levels)
         final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
         if final.effects:
@@ -183,6 +189,25 @@ class Search:
         left = Screen(base, linear, listed).least_left(CRITERIA.most_effects)
         return left > CRITERIA.hopeless**2 * float(base.used.sum())
 
+    def may_be_one_more(self, model: Model) -> bool:
+        """Whether what specimens differ by, each in a way of its own, may be one more effect.
+
+        That is, whether one leaves noise beside the model, to first order, with specimens that are
+        alike: of what does not go by the way they were tested it would leave far more.
+        """
+        if not self.judge.differ_in_their_way(model):
+            return False
+        if model not in self._one_more:
+            try:
+                base = self.models.of_alike_specimens(model)
+            except SolveError:
+                return False
+            alike = Variances(base.variances.noise)
+            linear = ToFirstOrder(self.experiment, base, alike, CRITERIA.far)
+            least = linear.least_left(self._added_to(base))
+            self._one_more[model] = least < CRITERIA.one_more * float(base.used.sum())
+        return self._one_more[model]
+
     def _looked_through(self) -> tuple[list[Candidate], list[list[Model]]]:
         """Candidates by themselves, and models by their number of effects, the best first."""
         if self._one_by_one is None:
@@ -259,7 +284,7 @@ class Search:
         Of terms only where their noise is not in doubt. And where specimens differ unusually, or
         each was tested in a way of its own, what they differ by may be a further effect.
         """
-        if not self.judge.settled(model, baseline) or self.judge.differ_in_their_way(model):
+        if not self.judge.settled(model, baseline) or self.may_be_one_more(model):
             return False
         if self._screened_first:
             return not self.judge.doubtful_noise(model)

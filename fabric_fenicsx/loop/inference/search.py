@@ -54,6 +54,9 @@ def diagnose_test(
     if found.curve is not None:
         return found
     if search.gave_way and further.found is not None:
+        if further.may_be_more:
+            further.most = None
+            further.run()
         return _beside(further.found, found)
     if not search.accounted:
         further.most = None
@@ -138,6 +141,7 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
             further.most = None
             return _beside(further.run(), found)
         doubted = len(chosen.effects) > 1 and search.doubtful_noise
+        doubted |= further.may_be_one_more(final)
         if doubted or search.judge.slow_noise(final):
             # It may be a misfit: what several terms explain instead is not said to be noise.
             several = _several(further, final.criterion)
@@ -157,7 +161,7 @@ def _in_their_place(search: Search, further: Search, single: Search, gain: float
             names_of += [effect.name for effect in found.effects]
     elif len(found.effects) == 1:
         _name(single, other.effects[0], search, found.effects[0])
-    if single.doubtful_noise:
+    if single.doubtful_noise or single.may_be_more:
         several = _several(further, other.criterion_after)
         if several is not None:
             return _beside(several, found)

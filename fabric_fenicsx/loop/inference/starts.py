@@ -294,6 +294,11 @@ class ToFirstOrder:
                 lefts[first + k] = r @ r - by @ step
         return lefts
 
+    def least_left(self, combinations: Sequence[Combination]) -> float:
+        """The least sum of squares that one of some combinations leaves; infinite without any."""
+        starts = (self.start(one) for one in combinations)
+        return min((start.left for start in starts if start is not None), default=float("inf"))
+
     def start(self, combination: Combination) -> _Start | None:
         """The step that least squares would take within bounds, and the sum of squares after it.
 
