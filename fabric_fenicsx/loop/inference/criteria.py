@@ -94,8 +94,8 @@ class Criteria:
             are not fitted where a single term without a formula leaves noise; made-up.
         half_again: times what such a term leaves that two effects leave, beyond which no three are
             fitted; made-up.
-        one_more: sum of squares, white and per reading, that an effect may leave to first order to be
-            what specimens differ by that were each tested in a way of their own; made-up.
+        one_more: sum of squares, white and per reading, that an effect may leave to first order,
+            to be what specimens differ by that were each tested in a way of their own; made-up.
         far_off: a first start of a form that leaves this many times more than the best start, to
             first order, is not followed; made-up.
         second_start: ... nor a second start that leaves this many times more; made-up.

@@ -11,16 +11,17 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from ...errors import SolveError
 from ..kept import Kept
+from .beside import by_itself, forms_beside
 from .choice import chosen_model, in_place_of, models_instead, verdict_on
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis
 from .effects import Effect, Variant
-from .experiment import Experiment, each_by_itself
+from .experiment import Experiment
 from .fitting import Fit, fit
 from .judge import Model
 from .models import Models, nothing_left
@@ -28,7 +29,7 @@ from .noise import quantum
 from .notes import errors_beside, noise_source, notes_of
 from .rivals import pairs_of, rivals_of
 from .screen import Screen, Signatures
-from .starts import Combination, Signature, ToFirstOrder, signatures
+from .starts import Combination, ToFirstOrder, signatures
 from .variances import Variances
 
 __all__ = ["Search"]
@@ -261,7 +262,7 @@ class Search:
             tried = screen.most_promising(CRITERIA.terms, CRITERIA.decisive)
         for k, effect in enumerate(tried):
             self.progress(0.1 + 0.4 * k / len(tried), f"fit {effect.name}")
-            own = _by_itself(self._signatures[effect])
+            own = by_itself(self._signatures[effect])
             found += self.models.fitted(own, starts=2)
             alike += self.models.with_alike_specimens(own)
         # Sizes of fits that allow for specimens and of those that do not are not compared.
@@ -316,7 +317,7 @@ class Search:
                 left[effect] = model.size(CRITERIA.far) + self.judge.cost(model, (effect,))
         found: list[Fit] = []
         for effect in sorted(left, key=lambda one: left[one])[: CRITERIA.products]:
-            found += self.models.fitted(_by_itself(signs[effect]), starts=1)
+            found += self.models.fitted(by_itself(signs[effect]), starts=1)
         return self.models.ranked(found)
 
     def _signed(self, effects: Sequence[Effect]) -> Signatures:
@@ -346,36 +347,7 @@ class Search:
         """
         present = self.models.effects_of(model)
         others = [e for e in (*self.effects, *self._of_two) if e not in present]
-        return self._beside(model, others)
-
-    def _beside(self, model: Fit, effects: Sequence[Effect]) -> list[Combination]:
-        """Every form of some effects, about a model of specimens that are alike.
-
-        None where there is no such model: as specimens differ some of them may have a solution
-        that what they have in common has not.
-        """
-        values = set(model.values)
-        try:
-            expected, slopes = self.experiment.predict(model.variants, model.values)
-        except SolveError:
-            return []
-        forms = [
-            variant
-            for effect in effects
-            for variant in effect.variants
-            if values.isdisjoint(p.name for p in variant.parameters)
-        ]
-        every = each_by_itself(
-            self.experiment,
-            lambda variant: signatures(self.experiment, model, expected, slopes, variant),
-            forms,
-            [expected, *slopes.values()],
-        )
-        return [
-            ((variant, shape),)
-            for variant, shapes in zip(forms, every, strict=True)
-            for shape in shapes
-        ]
+        return forms_beside(self.experiment, model, others)
 
     def _together(self, count: int, level: Sequence[Model]) -> list[Model]:
         """Models of several effects, the best first.
@@ -488,7 +460,7 @@ class Search:
                 )
             except SolveError:
                 continue
-            own = self._beside(base, [effect])
+            own = forms_beside(self.experiment, base, [effect])
             found += self.models.fitted(own, starts=1, base=base)
         if found:
             levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
@@ -505,11 +477,6 @@ class Search:
         singles = levels[1] if len(levels) > 1 else []
         limit = min((m.criterion for m in singles), default=0.0) + CRITERIA.decisive
         return tuple(dict.fromkeys(m.effects[0].name for m in singles if m.criterion < limit))
-
-
-def _by_itself(forms: Mapping[Variant, Sequence[Signature]]) -> list[Combination]:
-    """Each shape of each form of an effect."""
-    return [((variant, shape),) for variant, shapes in forms.items() for shape in shapes]
 
 
 def _best_of(effect: Effect, levels: Sequence[Sequence[Model]]) -> Fit | None:
