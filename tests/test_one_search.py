@@ -15,6 +15,7 @@ from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.models import Models
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.one_search import Search
+from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.variances import Variances
 
 RUNS, EACH = 4, 150
@@ -148,3 +149,18 @@ def test_more_is_added_to_the_next_term_of_one_variable_as_well():
     own = search(test)
     own.models.with_these_variances = lambda model: model
     assert own._other_effects([best, of_two, same, other]) == [other]
+
+
+@pytest.mark.parametrize(
+    ("own_way", "verdict"), [(True, "effect_discovered"), (False, "no_effect")]
+)
+def test_specimens_that_differ_in_their_own_way_do_not_hide_a_term(own_way, verdict):
+    """Where no effect with a name is found and one term leaves noise without such differences."""
+    lean = np.repeat(np.array([1.0, -1.0, 0.5, -0.5]), EACH)
+    columns = {"kink": lambda t: np.maximum(t - 0.6, 0.0), "lean": lambda t: lean}
+    test = made(columns, lambda t: 0.3 * lean, [linear_effect("kink")])
+    test.terms, test.each_its_own_way = [linear_effect("lean", acts_on="reading")], own_way
+    test.terms_are_rivals = False
+    found = diagnose_test(test)
+    assert found.verdict == verdict
+    assert [e.name for e in found.effects] == ["lean"] * own_way

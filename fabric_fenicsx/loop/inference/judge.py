@@ -309,12 +309,12 @@ class Judge:
         return self._unusual(model, {p.name for p in self.experiment.baseline})
 
     def differ_in_their_way(self, model: Model) -> bool:
-        """Whether specimens beside an effect, each tested in a way of its own, differ visibly.
+        """Whether specimens, each tested in a way of its own, differ visibly.
 
-        By more than the noise, that is: what they differ by may be a further effect, which is as
-        much of a claim.
+        By more than the noise, that is: what they differ by may be an effect, or a further one,
+        which is as much of a claim.
         """
-        if not (self.experiment.each_its_own_way and model.effects and model.fit.deviations):
+        if not (self.experiment.each_its_own_way and model.fit.deviations):
             return False
         rows, weight = model.fit.used, self._readings.weight
         alike = linearised(self.experiment, model.fit).residual

@@ -61,7 +61,7 @@ def diagnose_test(
     if not search.accounted:
         further.most = None
         return _beside(further.run(), found)
-    doubt = _doubt(search)
+    doubt = _doubt(search, further)
     return found if doubt is None else _against_a_term(search, further, doubt)
 
 
@@ -80,8 +80,13 @@ class _Doubt:
     rivals: bool
 
 
-def _doubt(search: Search) -> _Doubt | None:
-    """Of what a search for effects with names has chosen; None where there is none."""
+def _doubt(search: Search, further: Search) -> _Doubt | None:
+    """Of what a search for effects with names has chosen; None where there is none.
+
+    Args:
+        search: for these.
+        further: for all terms.
+    """
     chosen, experiment = search.chosen, search.experiment
     assert chosen is not None
     own = [effect.name for effect in chosen.effects]
@@ -93,8 +98,10 @@ def _doubt(search: Search) -> _Doubt | None:
     if len(own) > 1:
         # Several effects with names may imitate a single one that has none.
         return _Doubt(single, -CRITERIA.decisive, False)
-    if search.doubtful_noise or rivals:
-        # Before noise is said to be more than was stated, or as slow as a misfit, terms are tried.
+    hidden = not own and further.may_be_one_more(chosen)
+    if search.doubtful_noise or rivals or hidden:
+        # Before noise is said to be more than was stated, or as slow as a misfit, or specimens to
+        # differ, terms are tried.
         terms = [t for t in experiment.terms if not set(own) & set(t.general_form_of)]
         return _Doubt(terms, CRITERIA.decisive, rivals or bool(alike))
     if alike:
