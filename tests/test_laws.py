@@ -58,7 +58,7 @@ TOGETHER: dict[str, dict[str, Any]] = {
         "by": "angle",
     },
     "sliding_friction": {"rounding_rad_s": 1e-3},
-    "coulomb_friction": {"growth_1_rad": 0, "growth_1_rad2": 0},
+    "coulomb_friction": {"growth_1_rad": 0},
     "shaped": {
         "base": "elastic",
         "variable": "largest_angle",

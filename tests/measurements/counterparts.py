@@ -17,11 +17,7 @@ COUNTERPARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "coulomb": SLIDING,
         "tanh": SLIDING,
         "stick": ("Coulomb with stick", "two sliders"),
-        "dahl": (
-            "Dahl",
-            "Dahl, growing with the angle",
-            "Dahl, growing with the square of the angle",
-        ),
+        "dahl": ("Dahl", "Dahl, growing with the angle"),
     },
     "crossover_relaxation": {
         "short": ("one branch", "one branch, cubic", "two branches"),

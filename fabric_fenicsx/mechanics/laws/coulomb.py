@@ -12,13 +12,10 @@ from ...inputs.groups import NotNegative
 from ...inputs.parameters import Parameter
 from .law import Crossing, CrossingLaw, Form, Times, in_degrees, number, per_area
 
-__all__ = ["GROWTH", "GROWTH_SQUARED", "LIMIT", "CoulombFriction", "friction_numbers"]
+__all__ = ["GROWTH", "LIMIT", "CoulombFriction", "friction_numbers"]
 
 LIMIT = Parameter("m_c_N", lower=0.0, amplitude=True, meaning="friction moment per area")
 GROWTH = Parameter("growth_1_rad", (1.0,), 0.0, 50.0, meaning="of m_c, with the angle")
-GROWTH_SQUARED = Parameter(
-    "growth_1_rad2", (3.0,), 0.0, 500.0, meaning="of m_c, with the square of the angle"
-)
 
 
 def friction_numbers(
@@ -78,12 +75,12 @@ def _spread(*, one_stiffness: bool) -> tuple[dict[str, Any], ...]:
 
 @dataclass(frozen=True)
 class CoulombFriction(CrossingLaw):
-    """Elastic up to a limit m_c (1 + a |γ| + b γ²), then sliding. ψ = M²/2k of the stick.
+    """Elastic up to a limit m_c (1 + a |γ|), then sliding. ψ = M²/2k of the stick.
 
     Attributes:
         limit: m_c [N mm].
         stick_angle: γ_s [rad], in which the moment grows to the limit: k = m_c/γ_s.
-        growth, growth_squared: a [1/rad] and b [1/rad²], as shear presses the tows together.
+        growth: a [1/rad], as shear presses the tows together.
     """
 
     limit: Any = per_area("limit_N_mm", "largest moment per area")
@@ -91,9 +88,6 @@ class CoulombFriction(CrossingLaw):
         "stick_angle_deg", "limit over the stiffness of the stick", default=0.5
     )
     growth: Any = number("growth_1_rad", "a, growth of the limit with the angle", NotNegative, 0.0)
-    growth_squared: Any = number(
-        "growth_1_rad2", "b, growth of the limit with the square of the angle", NotNegative, 0.0
-    )
 
     law = "coulomb_friction"
     name = "Coulomb friction"
@@ -128,8 +122,7 @@ class CoulombFriction(CrossingLaw):
 
     def limit_at(self, at: Crossing) -> Any:
         """Largest moment at the angle at the end of the step [N mm]."""
-        growth = at.number(self.growth) * at.size + at.number(self.growth_squared) * at.size**2
-        return at.number(self.limit) * (1 + growth)
+        return at.number(self.limit) * (1 + at.number(self.growth) * at.size)
 
     def moment(self, at: Crossing) -> Any:
         """Return mapping: the trial moment, cut at the limits."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from ufl import conditional, exp, ge, max_value, min_value
 
-from .coulomb import GROWTH, GROWTH_SQUARED, CoulombFriction, friction_numbers
+from .coulomb import GROWTH, CoulombFriction, friction_numbers
 from .law import Crossing, Form
 
 __all__ = ["DahlFriction"]
@@ -19,7 +19,7 @@ class DahlFriction(CoulombFriction):
 
     With ψ = M²/2k it loses M² |γ̇|/m (P. R. Dahl, AIAA J. 14 (1976) 1675-1682). Its numbers are
     Coulomb's, the stiffness k being that at reversal of a relaxed contact; the limit
-    m = m_c (1 + a |γ| + b γ²) is that at the end of the step.
+    m = m_c (1 + a |γ|) is that at the end of the step.
     """
 
     law = "dahl_friction"
@@ -30,12 +30,6 @@ class DahlFriction(CoulombFriction):
             "crossover_friction",
             "Dahl, growing with the angle",
             (friction_numbers() | {"growth": GROWTH},),
-            rank=7,
-        ),
-        Form(
-            "crossover_friction",
-            "Dahl, growing with the square of the angle",
-            (friction_numbers() | {"growth_squared": GROWTH_SQUARED},),
             rank=7,
         ),
     )
