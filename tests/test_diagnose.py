@@ -6,6 +6,7 @@ import math
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
 from xml.etree import ElementTree as ET
@@ -21,7 +22,6 @@ from test_drape_loop import angle, made_up, marks, written
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.fabric import NEAREST
-from fabric_fenicsx.loop.inference.judge import Model
 from fabric_fenicsx.loop.inference.models import nothing_left
 from fabric_fenicsx.loop.inference.one_search import Search
 from fabric_fenicsx.loop.kinds.drape import model as drape
@@ -153,17 +153,30 @@ def test_the_unexplained_says_what_came_nearest(diagnosed, tmp_path):
     assert (tmp_path / "out" / NEAREST).exists()
 
 
+def emptied(model):
+    """A model whose last effect has its amplitudes on a bound at nothing."""
+    names = [p.name for p in model.fit.variants[-1].amplitudes]
+    values = model.fit.values | dict.fromkeys(names, 0.0)
+    empty = replace(model, fit=replace(model.fit, values=values, at_bound=tuple(names)))
+    assert nothing_left(empty.fit)
+    return empty
+
+
 def test_what_is_left_of_nothing_is_in_no_model_of_several(tmp_path, monkeypatch):
     """An effect whose amplitude ends at nothing beside others: the model is that of the others."""
     RECIPES["pair-crossover_friction-shear_locking"](tmp_path / "set")
     test = PictureFrame([read_measurement(tmp_path / "set")])
     names = ("crosshead_backlash", "crossover_friction", "shear_locking")
     search = Search(test, [e for e in test.effects if e.name in names], lambda done, what: None)
-    found, fitted = list[Model](), search._together
-    monkeypatch.setattr(search, "_together", lambda *of: found.extend(fitted(*of)) or list(found))
+    fitted = search._together
+
+    def with_others(*of):
+        """Its models, and after them each with nothing left of its last effect."""
+        models = fitted(*of)
+        return [*models, *map(emptied, models)]
+
+    monkeypatch.setattr(search, "_together", with_others)
     _, levels = search._looked_through()
-    gone = [nothing_left(model.fit) for model in found]
-    assert any(gone) and not all(gone)
     pairs = levels[2]
     assert pairs and not any(nothing_left(model.fit) for model in pairs)
 
