@@ -15,7 +15,7 @@ from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.models import Models
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.one_search import Search
-from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.inference.search import _alike, diagnose_test
 from fabric_fenicsx.loop.inference.variances import Variances
 
 RUNS, EACH = 4, 150
@@ -164,3 +164,19 @@ def test_specimens_that_differ_in_their_own_way_do_not_hide_a_term(own_way, verd
     found = diagnose_test(test)
     assert found.verdict == verdict
     assert [e.name for e in found.effects] == ["lean"] * own_way
+
+
+@pytest.mark.parametrize(
+    ("several", "alike"),
+    [
+        (("law", "curl"), True),
+        (("bend", "law"), False),
+        (("law",), False),
+        (("law", "warm"), False),
+    ],
+)
+def test_general_forms_of_effects_with_names_are_no_other_effects(several, alike):
+    law = replace(linear_effect("law", acts_on="bending_moment"), general_form_of=("bend",))
+    known = {name: linear_effect(name) for name in ("bend", "curl", "warm")} | {"law": law}
+    named = [known["bend"], known["curl"]]
+    assert _alike([known[name] for name in several], named) is alike

@@ -152,7 +152,7 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
         if doubted or search.judge.slow_noise(final):
             # It may be a misfit: what several terms explain instead is not said to be noise.
             several = _several(further, final.criterion)
-            if several is not None:
+            if several is not None and not _alike(several.effects, chosen.effects):
                 return _beside(several, found)
     if len(found.effects) == 1 and doubt.rivals:
         _name_terms(search, final, single)
@@ -181,6 +181,13 @@ def _several(further: Search, criterion: float) -> Diagnosis | None:
     found = further.run()
     better = found.criterion_after < criterion - CRITERIA.decisive
     return found if further.accounted and better else None
+
+
+def _alike(several: Sequence[Effect], named: Sequence[Effect]) -> bool:
+    """Whether several effects are those with a name, each itself or a general form of it."""
+    names = {effect.name for effect in named}
+    own = [{e.name, *e.general_form_of} & names for e in several]
+    return len(several) == len(named) and all(own) and set().union(*own) == names
 
 
 def _at_the_edge(model: Fit) -> bool:
