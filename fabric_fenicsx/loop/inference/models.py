@@ -99,14 +99,18 @@ class Models:
         scatter = {g: max(tau, FIRST_SCATTER) for g, tau in found.scatter.items()}
         self.variances = Variances(found.noise, scatter)
 
-    def with_these_variances(self, model: Model) -> Fit:
-        """A model fitted with the variances as they are now."""
+    def with_these_variances(self, model: Model, variances: Variances | None = None) -> Fit:
+        """A model fitted with some variances, by default as they are now.
+
+        Raises:
+            SolveError: it has no solution.
+        """
         return fit(
             self.experiment,
             model.fit.variants,
             model.fit.values,
             model.fit.used,
-            self.variances,
+            variances or self.variances,
             robust=CRITERIA.far,
         )
 
@@ -158,16 +162,9 @@ class Models:
         Raises:
             SolveError: it has no solution.
         """
-        found = model.fit
-        alike = dict.fromkeys(found.variances.scatter, ALIKE)
-        return fit(
-            self.experiment,
-            found.variants,
-            found.values,
-            found.used,
-            Variances(model.estimate.variances.noise, alike),
-            robust=CRITERIA.far,
-        )
+        alike = dict.fromkeys(model.fit.variances.scatter, ALIKE)
+        own = Variances(model.estimate.variances.noise, alike)
+        return self.with_these_variances(model, own)
 
     def effects_of(self, model: Fit) -> tuple[Effect, ...]:
         """Effects of a fitted model, in the order of its forms."""

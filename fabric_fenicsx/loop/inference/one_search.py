@@ -72,8 +72,6 @@ class Search:
         self.found: Diagnosis | None = None
         #: Effects that every other one was tried beside.
         self._tried: set[frozenset[Effect]] = set()
-        #: Forms of those that it was when several were first tried together.
-        self._added_to_these: set[frozenset[Variant]] = set()
         #: Effects that were tried in all their forms, and the forms beside which they were.
         self._in_all_forms: set[tuple[Effect, frozenset[Variant]]] = set()
         self._kept_screen: Kept[Screen] = Kept(1)
@@ -199,15 +197,19 @@ class Search:
         if not self.judge.differ_in_their_way(model):
             return False
         if model not in self._one_more:
-            try:
-                base = self.models.of_alike_specimens(model)
-            except SolveError:
-                return False
-            alike = Variances(base.variances.noise)
-            linear = ToFirstOrder(self.experiment, base, alike, CRITERIA.far)
-            least = linear.least_left(self._added_to(base))
-            self._one_more[model] = least < CRITERIA.one_more * float(base.used.sum())
+            self._one_more[model] = self._leaves_noise_beside(model)
         return self._one_more[model]
+
+    def _leaves_noise_beside(self, model: Model) -> bool:
+        """See may_be_one_more."""
+        try:
+            base = self.models.of_alike_specimens(model)
+        except SolveError:
+            return False
+        alike = Variances(base.variances.noise)
+        linear = ToFirstOrder(self.experiment, base, alike, CRITERIA.far)
+        least = linear.least_left(self._added_to(base))
+        return least < CRITERIA.one_more * float(base.used.sum())
 
     def _looked_through(self) -> tuple[list[Candidate], list[list[Model]]]:
         """Candidates by themselves, and models by their number of effects, the best first."""
@@ -229,13 +231,14 @@ class Search:
             # With noise as the best model leaves it.
             self.models.take_noise_from(best.fit)
             self.models.base = self.models.baseline(self.models.base.values)
-            levels.append(self._together(count, levels[-1]))
+            bases = self._bases(count, levels[-1])
+            levels.append(self._together(count, bases))
             if self._screened_first and levels[-1]:
                 # Before others take the place of what is only in the wrong form.
                 self._in_other_forms(levels)
             self._with_one_less(levels)
             if self._screened_first and levels[-1]:
-                self._exchanged(levels)
+                self._exchanged(levels, bases)
                 self._in_other_forms(levels)
             # With an effect of which nothing is left it is a model of fewer, which is among those.
             levels[-1] = [m for m in levels[-1] if not nothing_left(m.fit)]
@@ -349,25 +352,31 @@ class Search:
         others = [e for e in (*self.effects, *self._of_two) if e not in present]
         return forms_beside(self.experiment, model, others)
 
-    def _together(self, count: int, level: Sequence[Model]) -> list[Model]:
+    def _bases(self, count: int, level: Sequence[Model]) -> list[Fit]:
+        """Models that every other effect is added to, fitted with the variances as they are now.
+
+        Args:
+            count: of effects that there are then.
+            level: models of one effect less, the best first, which is the first of them.
+        """
+        best = self.models.with_these_variances(level[0])
+        if self._screened_first:
+            # Terms, of which there are many, are tried in their forms when they are found.
+            return [best, *self._other_effects(level)]
+        return [best, *(self._other_forms(best) if count == 2 else [])]
+
+    def _together(self, count: int, bases: Sequence[Fit]) -> list[Model]:
         """Models of several effects, the best first.
 
         Args:
             count: of effects.
-            level: models of one effect less, the best first.
+            bases: models of one effect less, which others are added to.
         """
         combinations = self._screened().best(CRITERIA.combinations, count)
         fits = self.models.fitted(combinations, starts=1)
-        fewer = self.models.with_these_variances(level[0])
-        starts, most = 1, None
-        if self._screened_first:
-            # Terms, of which there are many, are tried in their forms when they are found.
-            others, most = self._other_effects(level), CRITERIA.terms
-        else:
-            others = [] if count > 2 else self._other_forms(fewer)
-            starts = 2 if others else 1
-        self._added_to_these = {frozenset(one.variants) for one in (fewer, *others)}
-        for base in (fewer, *others):
+        most = CRITERIA.terms if self._screened_first else None
+        starts = 1 if self._screened_first else min(len(bases), 2)
+        for base in bases:
             fits += self.models.fitted(self._added_to(base), starts=starts, base=base, most=most)
         return self.models.ranked(fits)
 
@@ -413,7 +422,7 @@ class Search:
         new = [f for f in found if f.variants not in tried]
         levels[-2] = self.models.best_refined([*levels[-2], *self.models.weighed(new)])
 
-    def _exchanged(self, levels: list[list[Model]]) -> None:
+    def _exchanged(self, levels: list[list[Model]], bases: Sequence[Fit]) -> None:
         """The best model of the last level with each effect in turn replaced by any other.
 
         What was added to the best model of one effect less stands for what that one has wrong; and
@@ -421,18 +430,19 @@ class Search:
 
         Args:
             levels: models by their number of effects, which more are added to.
+            bases: what everything was added to already.
         """
-        tried = set(self._added_to_these)
+        tried = {frozenset(base.variants) for base in bases}
         for _ in range(CRITERIA.exchanges):
             whole = levels[-1][0].fit.variants
             kept = [frozenset(whole) - {out} for out in whole]
-            bases = {frozenset(m.fit.variants): m for m in reversed(levels[-2])}
-            own = [k for k in kept if k in bases and k not in tried]
+            fewer = {frozenset(m.fit.variants): m for m in reversed(levels[-2])}
+            own = [k for k in kept if k in fewer and k not in tried]
             if not own:
                 break
             tried |= set(own)
             found: list[Fit] = []
-            for model in (bases[k] for k in own):
+            for model in (fewer[k] for k in own):
                 base = self.models.with_these_variances(model)
                 more = self._added_to(base)
                 found += self.models.fitted(more, starts=1, base=base, most=CRITERIA.terms)
