@@ -18,7 +18,7 @@ from fabric_fenicsx.fabric.section import RectangularSection
 from fabric_fenicsx.loop.fabric import law_entries
 from fabric_fenicsx.loop.kinds.cantilever import CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.effects import CANTILEVER_EFFECTS
-from fabric_fenicsx.loop.kinds.cantilever.hanging import HangingTow
+from fabric_fenicsx.loop.kinds.cantilever.hanging import HangingTows, Tow
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
 from fabric_fenicsx.loop.kinds.cantilever.terms import terms
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
@@ -96,12 +96,12 @@ HANGS = {"m_s_N": 0.04, "kappa_s_1_mm": 0.002, "b_N_mm3": 2e4, "m_s1_N": 0.02, "
 def test_the_tow_of_a_model_hangs_as_that_of_the_loop(variant):
     """The same cells and weight: places to a ten-thousandth of the drop, which the law changes."""
     values = {"C1_MPa": C1, **{p.name: HANGS[p.name] for p in variant.parameters}}
-    loop = HangingTow(LENGTH, 4.57, 0.04, SPACING, WEIGHT)
+    loop = HangingTows([Tow(LENGTH, 4.57, 0.04, SPACING, WEIGHT)])
     law = Cantilever([strip_read()])._laws([variant], False)
     shape = loop.solve(values, law, slopes=False)
     straight = loop.solve({"C1_MPa": C1}, slopes=False)
     assert np.abs(shape.z - straight.z).max() > 0.1 * np.abs(straight.z).max() > 3.0
-    points = loop.arc[:, None] * [1.0, 0.0, 0.0]
+    points = loop.arc[0][:, None] * [1.0, 0.0, 0.0]
     model = Model(
         single_tow(points, (0.0, 0.0, 1.0)),
         # The density holds the weight, so gravity is a direction.
@@ -115,8 +115,8 @@ def test_the_tow_of_a_model_hangs_as_that_of_the_loop(variant):
     # Fibres that stick, then slip, have a kink for Newton to step over.
     statics.run(100)
     found = points + statics.displacements
-    np.testing.assert_allclose(found[:, 2], shape.z, atol=1e-4 * np.abs(shape.z).max())
-    np.testing.assert_allclose(found[:, 0], shape.x, atol=1e-4 * np.abs(shape.z).max())
+    np.testing.assert_allclose(found[:, 2], shape.z[0], atol=1e-4 * np.abs(shape.z).max())
+    np.testing.assert_allclose(found[:, 0], shape.x[0], atol=1e-4 * np.abs(shape.z).max())
 
 
 def strip_read():

@@ -15,7 +15,7 @@ from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.cantilever import CantileverRig
-from fabric_fenicsx.loop.kinds.cantilever.hanging import HangingTow
+from fabric_fenicsx.loop.kinds.cantilever.hanging import HangingTows, Tow
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 
@@ -241,7 +241,7 @@ def test_a_strip_far_from_the_last_one(exact, heavy, kappa0):
 
 
 def test_no_balance_is_told():
-    tow = HangingTow(LENGTH, WIDTH, HEIGHT, SPACING, WEIGHT)
+    tow = HangingTows([Tow(LENGTH, WIDTH, HEIGHT, SPACING, WEIGHT)])
     with pytest.raises(SolveError, match="a strip of 250 mm finds no balance"):
         tow.solve({"C1_MPa": 0.0})
 
@@ -262,7 +262,7 @@ def test_a_strip_wound_up_does_not_spoil_the_next(exact):
 
 def test_solutions_leave_no_memory_behind():
     # PETSc keeps what Python has dropped until it is told to let go.
-    tow = HangingTow(LENGTH, WIDTH, HEIGHT, SPACING, WEIGHT)
+    tow = HangingTows([Tow(LENGTH, WIDTH, HEIGHT, SPACING, WEIGHT)])
 
     def resident():
         pages = int(Path("/proc/self/statm").read_text().split()[1])
@@ -305,7 +305,7 @@ def test_without_a_balance_the_law_goes_as_far_as_the_clamp_asks(monkeypatch):
     def no_balance(*_, **__):
         raise SolveError("no balance")
 
-    monkeypatch.setattr(experiment._specimens[0].tow, "solve", no_balance)
+    monkeypatch.setattr(experiment._strips[0].tows, "solve", no_balance)
     law = experiment.law(variants, SOFT)
     assert law.value[-1] == pytest.approx(exact, rel=0.1)
     assert law.at[-1] == pytest.approx(reached.at[-1], rel=0.2)

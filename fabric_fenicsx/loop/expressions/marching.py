@@ -88,19 +88,19 @@ class Marched:
     def __call__(
         self,
         inputs: Mapping[str, Varying],
-        values: Mapping[str, float],
+        values: Mapping[str, float | Array],
         first: Mapping[str, Array] = MappingProxyType({}),
     ) -> dict[str, Varying]:
         """Evaluate over whole records.
 
         Args:
             inputs: by their names.
-            values: of the parameters.
+            values: of the parameters; without memory also those of each record, which broadcast.
             first: what is remembered before the first point of each record, (n_records,), by name
                 as in ``remembered``; of others nothing.
         """
         known = {name: inputs[name] for name in self.inputs}
-        numbers = {name: values[name] for name in self.parameters}
+        numbers: dict[str, Any] = {name: values[name] for name in self.parameters}
         shape = next(iter(known.values())).value.shape
         if self._memory:
             begin = {

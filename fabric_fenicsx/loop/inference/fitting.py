@@ -39,6 +39,9 @@ Array = npt.NDArray[np.float64]
 
 #: Least information about a combination of parameters, as a share of the most: round-off.
 LEAST_KNOWN = 1e-14
+#: Share of the sum of squares below which a step's gain ends a fit, and one of which only the rank
+#: among others is wanted.
+CLOSELY, NEARLY = 1e-8, 1e-5
 #: Scatter below which specimens are taken to be alike.
 ALIKE = 1e-4
 #: Standard errors from a bound that are none.
@@ -282,7 +285,7 @@ def fit(
             bounds=model.bounds,
             x_scale="jac",
             xtol=1e-8,
-            ftol=1e-8,
+            ftol=CLOSELY if robust is None else NEARLY,
             gtol=1e-12,
             max_nfev=evaluations,
             loss="linear" if robust is None else "soft_l1",

@@ -12,6 +12,10 @@ from .variant import StripVariant
 __all__ = ["EachSpecimen", "names_of"]
 
 Array = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.int64]
+
+#: A specimen that is not fitted.
+UNFITTED = -1
 
 
 def names_of(variant: StripVariant) -> tuple[str, ...]:
@@ -32,28 +36,48 @@ class EachSpecimen:
             if p.specimen is not None:
                 self._of.setdefault(p.shared_name, {})[p.specimen] = p.name
 
-    def values(self, values: Mapping[str, float], specimen: int | None = None) -> dict[str, float]:
-        """All values as a specimen has them; where it has none of its own, the mean of the others'.
+    def of_one(self, values: Mapping[str, float]) -> dict[str, float]:
+        """All values as a specimen that is not fitted has them: the mean of the others' own."""
+        own = {shared: float(self._own(values, shared, UNFITTED)) for shared in self._of}
+        return {**values, **own}
+
+    def of_each(
+        self, values: Mapping[str, float | Array], specimens: Numbers
+    ) -> dict[str, float | Array]:
+        """All values as specimens have them; one that has none of its own has the others' mean.
 
         Args:
-            values: of the model's parameters.
-            specimen: counted from 0; by default one that is not fitted.
+            values: of the model's parameters, numbers or those of each specimen, (n, 1).
+            specimens: counted from 0, (n,).
+
+        Returns:
+            The same with what specimens have of their own, (n, 1), by its shared name.
         """
         own = {
-            shared: float(np.mean([values[name] for name in self._names(shared, specimen)]))
+            shared: np.array([[self._own(values, shared, s)] for s in specimens.tolist()])
             for shared in self._of
         }
         return {**values, **own}
 
-    def slopes(self, slopes: Mapping[str, Array], specimen: int) -> dict[str, Array]:
-        """Derivatives in the model's parameters, from those in what the specimen has."""
+    def _own(self, values: Mapping[str, float | Array], shared: str, specimen: int) -> np.float64:
+        return np.mean(np.array([values[name] for name in self._names(shared, specimen)]))
+
+    def slopes(self, slopes: Mapping[str, Array], specimens: Numbers) -> dict[str, Array]:
+        """Derivatives in the model's parameters, from those in what each specimen has.
+
+        Args:
+            slopes: of readings, (n,) each.
+            specimens: of these readings, (n,).
+        """
         found = {name: slope for name, slope in slopes.items() if name not in self._of}
-        for shared in self._of:
-            names = self._names(shared, specimen)
-            if shared in slopes:
-                found |= {name: slopes[shared] / len(names) for name in names}
+        for shared in self._of.keys() & slopes.keys():
+            for s in np.unique(specimens).tolist():
+                names, mine = self._names(shared, s), specimens == s
+                for name in names:
+                    own = found.setdefault(name, np.zeros(len(specimens)))
+                    own[mine] = slopes[shared][mine] / len(names)
         return found
 
-    def _names(self, shared: str, specimen: int | None) -> list[str]:
+    def _names(self, shared: str, specimen: int) -> list[str]:
         of = self._of[shared]
         return [of[specimen]] if specimen in of else [*of.values()]

@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 
 from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
@@ -31,10 +30,10 @@ from ...inference.experiment import NO_DEVIATIONS, Deviations, Law
 from ...measurement.readings import common_noise, readings_of, specimens_of
 from ...measurement.schema import Measurement
 from ..records import FEWEST_BEFORE, earlier_alike, last_run
-from .compared import HungStrip, expected_heights, places_on
+from .compared import HungStrips, expected_heights, places_on
 from .each_specimen import EachSpecimen, names_of
 from .effects import CANTILEVER_EFFECTS
-from .hanging import HangingTow, Laws, Shape, sum_of
+from .hanging import HangingTows, Laws, Shapes, Tow, sum_of
 from .measured_line import scatter_of_x, smooth_line
 from .terms import terms
 from .variant import StripVariant
@@ -107,7 +106,7 @@ class Cantilever:
         unknown = np.isnan(self._arc)
         self._steepness = np.where(unknown, np.minimum(np.abs(np.tan(slope)), STEEPEST), 0.0)
         start = self._start() if like is None else like.baseline[0].starts[0]
-        self.stiffness_per_C1 = self._specimens[0].tow.stiffness_per_C1
+        self.stiffness_per_C1 = float(self._strips[0].tows.stiffness_per_C1[0, 0])
         self.baseline: tuple[Parameter, ...] = (
             Parameter(
                 "C1_MPa",
@@ -184,20 +183,11 @@ class Cantilever:
         rows = self.readings.fit
         return np.unique(self._run[rows]).tolist(), np.unique(self.readings.specimen[rows]).tolist()
 
-    @property
-    def _distance(self) -> Array:
-        """Of the readings from the clamp [mm]."""
-        x = np.empty(len(self._run))
-        for own in self._specimens:
-            x[own.rows] = own.x
-        return x
-
     def _lay_out(self, measurements: Sequence[Measurement]) -> None:
         """Readings in the order of runs, in a run by length and along the strip."""
-        tows: dict[tuple[Any, ...], HangingTow] = {}
         table: list[Array] = []
         run_of: list[npt.NDArray[np.int64]] = []
-        keys: list[tuple[int, int, tuple[Any, ...]]] = []
+        keys: list[tuple[bool, int, Tow]] = []
         specimens = specimens_of(measurements)
         number = 0
         # Runs that nothing can be told by share their strips.
@@ -216,30 +206,32 @@ class Cantilever:
                 columns = [c[n][order] for n in ("length_mm", "s_mm", "x_mm", "z_mm")]
                 table.append(np.stack(columns))
                 run_of.append(np.full(run.count, number, dtype=np.int64))
-                for length in columns[0]:
-                    size = (float(length), tow.width_mm, tow.height_mm, spacing, weight)
-                    key = (*size, self._before[number], m.rig.upside_down)
-                    keys.append((specimens[number], number, key))
-                    if key not in tows:
-                        tows[key] = HangingTow(*size, self._before[number])
+                rest = (tow.width_mm, tow.height_mm, spacing, weight, self._before[number])
+                own = specimens[number]
+                keys += [(m.rig.upside_down, own, Tow(float(L), *rest)) for L in columns[0]]
                 number += 1
-        self._length, self._arc, x, self._observed = np.concatenate(table, axis=1)
+        self._length, self._arc, self._distance, self._observed = np.concatenate(table, axis=1)
         self._run = np.concatenate(run_of)
-        self._specimens = []
-        for own in dict.fromkeys(keys):
-            rows = np.array([i for i, other in enumerate(keys) if other == own])
-            self._specimens.append(
-                HungStrip(
-                    tows[own[2]],
-                    own[0],
-                    own[1],
-                    rows,
-                    self._arc[rows],
-                    x[rows],
-                    self._observed[rows],
-                    own[2][-1],
-                )
-            )
+        self._strips = [
+            self._hung(keys, turned) for turned in dict.fromkeys(key[0] for key in keys)
+        ]
+
+    def _hung(self, keys: Sequence[tuple[bool, int, Tow]], turned: bool) -> HungStrips:
+        """The strips that are upside down, or the others, of every reading's key."""
+        rows = np.array([i for i, key in enumerate(keys) if key[0] == turned])
+        own = list(dict.fromkeys(keys[i] for i in rows))
+        number = {key: k for k, key in enumerate(own)}
+        return HungStrips(
+            HangingTows([tow for *_, tow in own]),
+            np.array([specimen for _, specimen, _ in own]),
+            turned,
+            rows,
+            np.array([number[keys[i]] for i in rows]),
+            self._run[rows],
+            self._arc[rows],
+            self._distance[rows],
+            self._observed[rows],
+        )
 
     # Start --------------------------------------------------------------------------------
 
@@ -249,42 +241,44 @@ class Cantilever:
         In units of its length such a strip depends on w L³/B alone, but for a stretch of no
         account: one strip that softens step by step gives them all.
         """
-        longest = max((own.tow for own in self._specimens), key=lambda tow: tow.load_per_C1)
+        every = [tow for own in self._strips for tow in own.tows.tows]
+        longest = max((HangingTows([tow]) for tow in every), key=lambda tow: tow.load_per_C1.item())
+        load_per_C1 = longest.load_per_C1.item()
         lines = []
         for load in LOADS:
             try:
-                shape = longest.solve({"C1_MPa": longest.load_per_C1 / load}, slopes=False)
+                shape = longest.solve({"C1_MPa": load_per_C1 / load}, slopes=False)
             except SolveError:
                 break
-            lines.append(np.stack([shape.x, shape.z]) / longest.length)
+            lines.append(np.concatenate([shape.x, shape.z]) / longest.arc[0, -1])
         if not lines:
-            raise SolveError(f"a strip of {longest.length:g} mm does not hang at any stiffness")
+            length = longest.tows[0].length
+            raise SolveError(f"a strip of {length:g} mm does not hang at any stiffness")
         loads, table = LOADS[: len(lines)], np.array(lines)
         misses = []
         for load in loads:
             total = 0.0
-            for own in self._specimens:
-                share = own.tow.load_per_C1 / longest.load_per_C1
-                x, z = own.tow.length * _between(np.log(loads), table, np.log(load * share))
-                total += float(
-                    np.abs(own.z - expected_heights(own, self._steepness, x, z, {})[0]).sum()
-                )
+            for own in self._strips:
+                shares = own.tows.load_per_C1[:, 0] / load_per_C1
+                each = [_between(np.log(loads), table, np.log(load * share)) for share in shares]
+                x, z = np.stack(each, axis=1) * own.tows.arc[:, -1:]
+                heights, _ = expected_heights(own, self._steepness, x, z, {})
+                total += float(np.abs(own.z - heights).sum())
             misses.append(total)
-        longest.solve({"C1_MPa": longest.load_per_C1 / loads[0]}, slopes=False)
-        return float(longest.load_per_C1 / loads[int(np.argmin(misses))])
+        return float(load_per_C1 / loads[int(np.argmin(misses))])
 
     def _measured_slopes(self) -> tuple[Array, float]:
         """Slope of the measured lines at each reading [rad], and r of the module's docstring."""
         slope = np.zeros(len(self._run))
         differences, shares = [], []
-        for own in self._specimens:
-            for run in np.unique(self._run[own.rows]):
-                mine = self._run[own.rows] == run
-                slope[own.rows[mine]], away = smooth_line(own.x[mine], own.z[mine])
-                if np.isnan(own.s[mine]).all():
+        for run in np.unique(self._run):
+            for length in np.unique(self._length[self._run == run]):
+                mine = (self._run == run) & (self._length == length)
+                slope[mine], away = smooth_line(self._distance[mine], self._observed[mine])
+                if np.isnan(self._arc[mine]).all():
                     # The line may not be as smooth as the polynomials: so differences, again.
                     differences.append(away[1:-1] - (away[:-2] + away[2:]) / 2.0)
-                    at = slope[own.rows[mine]]
+                    at = slope[mine]
                     part = np.stack([np.cos(at) ** 2, np.sin(at) ** 2], axis=1)
                     shares.append(part[1:-1] + (part[:-2] + part[2:]) / 4.0)
         if not shares:
@@ -295,13 +289,12 @@ class Cantilever:
         """Arc length of every reading, and the largest curvature and moment per width."""
         arc = np.zeros(len(self._run))
         curvatures, moments = [], []
-        for own in self._specimens:
-            shape = own.tow.solve({"C1_MPa": C1}, slopes=False)
-            arc[own.rows] = places_on(
-                own, CubicSpline(own.tow.arc, np.stack([shape.x, shape.z], axis=1))
-            )
-            curvatures.append(float(np.abs(shape.curvature).max()))
-            moments.append(curvatures[-1] * C1 * own.tow.stiffness_per_C1)
+        for own in self._strips:
+            shape = own.tows.solve({"C1_MPa": C1}, slopes=False)
+            arc[own.rows] = places_on(own, shape.x, shape.z)
+            largest = np.abs(shape.curvature).max(axis=1, keepdims=True)
+            curvatures.append(float(largest.max()))
+            moments.append(float((largest * C1 * own.tows.stiffness_per_C1).max()))
         return arc, max(curvatures), max(moments)
 
     # Prediction ---------------------------------------------------------------------------
@@ -311,12 +304,12 @@ class Cantilever:
         each = EachSpecimen(variants)
         try:
             shapes = [
-                own.tow.solve(
-                    each.values(values, own.specimen),
+                own.tows.solve(
+                    each.of_each(values, own.specimens),
                     self._laws(variants, own.upside_down),
                     slopes=False,
                 )
-                for own in self._specimens
+                for own in self._strips
             ]
         except SolveError:
             # From where the strips were left last there may be no way. The moment at a clamp goes
@@ -351,27 +344,25 @@ class Cantilever:
     ) -> tuple[Array, dict[str, Array]]:
         """Heights [mm] and their derivatives; see Experiment."""
         strips = [v for v in variants if isinstance(v, StripVariant)]
-        laws = {turned: self._laws(strips, turned) for turned in (False, True)}
         names = [p.name for p in (*self.baseline, *(p for v in strips for p in v.parameters))]
         each = EachSpecimen(strips)
         expected = np.zeros(len(self._run))
         slopes = {name: np.zeros(len(self._run)) for name in names}
-        shapes: dict[tuple[float, ...], Shape] = {}
-        for own in self._specimens:
-            factors = {name: 1.0 + float(d[own.specimen]) for name, d in deviations.items()}
+        for own in self._strips:
+            factors = {name: 1.0 + d[own.specimens][:, None] for name, d in deviations.items()}
             mine = {name: value * factors.get(name, 1.0) for name, value in values.items()}
-            mine = each.values(mine, own.specimen)
-            key = (id(own.tow), *mine.values())
-            shape = shapes[key] = shapes.get(key) or own.tow.solve(mine, laws[own.upside_down])
+            mine = each.of_each(mine, own.specimens)
+            shapes = own.tows.solve(mine, self._laws(strips, own.upside_down))
             heights, changes = expected_heights(
-                own, self._steepness, *self._seen(shape, own, strips, mine)
+                own, self._steepness, *self._seen(shapes, own, strips, mine)
             )
-            changes = each.slopes(changes, own.specimen)
+            changes = each.slopes(changes, own.specimens[own.tow])
             for zeros in (v for v in strips if v.each_run):
-                heights, changes = self._with_zero(own, zeros, values, heights, changes)
+                heights, changes = self._with_zeros(own, zeros, values, heights, changes)
             expected[own.rows] = heights
             for name, change in changes.items():
-                slopes[name][own.rows] = change * factors.get(name, 1.0)
+                factor = factors[name][own.tow, 0] if name in factors else 1.0
+                slopes[name][own.rows] = change * factor
         return expected, slopes
 
     def settle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
@@ -389,9 +380,9 @@ class Cantilever:
         self, kappa: Array, variants: Sequence[StripVariant], values: Mapping[str, float]
     ) -> Law:
         """The same at given curvatures."""
-        laws, values = self._laws(variants, False), EachSpecimen(variants).values(values)
+        laws, values = self._laws(variants, False), EachSpecimen(variants).of_one(values)
         per_C1 = self.stiffness_per_C1
-        longest = max(own.tow.length for own in self._specimens)
+        longest = float(self._length.max())
         clamp = {
             "s": Varying(np.zeros_like(kappa)),
             "length": Varying(np.full_like(kappa, longest)),
@@ -438,41 +429,47 @@ class Cantilever:
             self._compiled[key] = law.define({result: expression}, {})
         return self._compiled[key]
 
-    def _with_zero(
+    def _with_zeros(
         self,
-        own: HungStrip,
+        own: HungStrips,
         variant: StripVariant,
         values: Mapping[str, float],
         heights: Array,
         changes: dict[str, Array],
     ) -> tuple[Array, dict[str, Array]]:
-        """The same with the zero of the run; of one that is not fitted, what fits best there."""
-        for p in variant.parameters:
-            if p.run == own.run:
-                return heights + values[p.name], {**changes, p.name: np.ones(len(heights))}
-        seen = self.readings.usable[own.rows]
-        if seen.any():
-            heights = heights + np.mean((self._observed[own.rows] - heights)[seen])
-            changes = {name: change - np.mean(change[seen]) for name, change in changes.items()}
+        """The same with the zeros of the runs; of one not fitted, what fits best at each tow."""
+        own_zeros = {p.run: p.name for p in variant.parameters}
+        heights = heights.copy()
+        changes = {name: change.copy() for name, change in changes.items()}
+        for run, tow in np.unique(np.stack([own.run, own.tow]), axis=1).T:
+            mine = (own.run == run) & (own.tow == tow)
+            name = own_zeros.get(run)
+            if name is not None:
+                heights[mine] += values[name]
+                changes.setdefault(name, np.zeros(len(heights)))[mine] = 1.0
+                continue
+            seen = mine & self.readings.usable[own.rows]
+            if seen.any():
+                heights[mine] += np.mean((own.z - heights)[seen])
+                for change in changes.values():
+                    change[mine] -= np.mean(change[seen])
         return heights, changes
 
     def _seen(
         self,
-        shape: Shape,
-        own: HungStrip,
+        shapes: Shapes,
+        own: HungStrips,
         variants: Sequence[StripVariant],
-        values: Mapping[str, float],
+        values: Mapping[str, float | Array],
     ) -> tuple[Array, Array, dict[str, Array]]:
-        """Nodes as the camera sees them: x, z and derivatives, as those of a shape."""
+        """Nodes as the camera sees them: x, z and derivatives, as those of shapes."""
         cameras = [v for v in variants if v.camera is not None]
         if not cameras:
-            return shape.x, shape.z, shape.slopes
+            return shapes.x, shapes.z, shapes.slopes
         known = {
-            "x": Varying(shape.x, {name: slope[0] for name, slope in shape.slopes.items()}),
-            "z": Varying(shape.z, {name: slope[1] for name, slope in shape.slopes.items()}),
-            "s": Varying(own.tow.arc),
-            "length": Varying(np.full_like(shape.x, own.tow.length)),
-            "run": Varying(np.full_like(shape.x, own.tow.run)),
+            "x": Varying(shapes.x, {name: slope[0] for name, slope in shapes.slopes.items()}),
+            "z": Varying(shapes.z, {name: slope[1] for name, slope in shapes.slopes.items()}),
+            **own.tows.nodes,
         }
         for v in cameras:
             key = ("camera", v.camera, names_of(v), False)
@@ -484,7 +481,7 @@ class Cantilever:
             added = self._compiled[key](known, values)
             known |= {k: sum_of((known[k], added[k])) for k in ("x", "z")}
         x, z = known["x"], known["z"]
-        zero = np.zeros_like(shape.x)
+        zero = np.zeros_like(shapes.x)
         slopes = {
             name: np.stack([v.slopes.get(name, zero) + zero for v in (x, z)])
             for name in {**x.slopes, **z.slopes}
