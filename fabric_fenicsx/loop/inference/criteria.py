@@ -88,7 +88,9 @@ class Criteria:
         correlated: correlation of two estimates above which the report names them; convention.
         evaluations: of a model in a fit, at most; ``final_evaluations`` where its numbers are
             reported. A fit that ends there has not converged, and says so.
+        looks: starts of one effect, or of several together, that are fitted at all; made-up.
         first_look: evaluations after which it shows which fits are worth going on with; made-up.
+        ends: of these, the best, that are gone on with; made-up.
         worthwhile: those that leave no more than this many times what the best one does; made-up.
         hopeless: sigmas of a reading that several effects leave, to first order, beyond which they
             are not fitted where a single term without a formula leaves noise; made-up.
@@ -148,7 +150,9 @@ class Criteria:
     correlated: float = 0.98
     evaluations: int = 60
     final_evaluations: int = 300
+    looks: int = 96
     first_look: int = 12
+    ends: int = 24
     worthwhile: float = 30.0
     hopeless: float = 3.0
     half_again: float = 1.5

@@ -95,7 +95,7 @@ def fit_combinations(
     promising.sort(key=lambda one: one[1].left)
     if most is not None:
         promising = _of_so_many_kinds(promising, kinds, most)
-    wanted = _worth_a_look(promising)
+    wanted = _worth_a_look(promising)[: CRITERIA.looks]
     # A copy of the process returns them the same.
     known = [base.readings, base.used, variances, *(v for forms, _ in wanted for v in forms)]
 
@@ -123,7 +123,8 @@ def fit_combinations(
     looks = each_by_itself(experiment, looked_at, wanted, known)
     fits = [found for found in looks if found is not None]
     sizes = [f.size(robust) for f in fits]
-    on = [k for k, size in enumerate(sizes) if size <= CRITERIA.worthwhile * min(sizes)]
+    ahead = sorted(range(len(fits)), key=sizes.__getitem__)[: CRITERIA.ends]
+    on = [k for k in sorted(ahead) if sizes[k] <= CRITERIA.worthwhile * min(sizes)]
     ends = each_by_itself(experiment, finished, [fits[k] for k in on], [*known, *fits])
     for k, found in zip(on, ends, strict=True):
         fits[k] = found
