@@ -256,6 +256,9 @@ def test_the_headline_claims_no_more_than_readings_know_of_a_term():
     assert "(discovered_1) does roughly: held-out" in rough
     assert "The 0.068 N that are left in the fitted runs are more than that" in rough
     assert said.count("by path") == 1 and "crossover_friction, the moment by path or" in said
+    same = [{"name": "rate_hardening", "in_general": True}]
+    said = headline(found | {"discovered": [term | {"rivals": same}]})
+    assert said.endswith(" It is rate_hardening in a form that is on no list.")
     said = headline(found | {"discovered": [term | {"one_curve": True}]})
     assert "depends on the" not in said and "acts on the moment (discovered_1) does" in said
     assert "not on which of rate, direction, path and time it depends" in said

@@ -5,7 +5,9 @@ rates and a hold, their columns beside the baseline's are fitted (non-negative l
 amplitudes have a sign) to closed forms, for the best of many values of the form's one shape.
 """
 
+from dataclasses import replace
 from functools import cache, partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +18,10 @@ from ufl import as_ufl
 from fabric_fenicsx.loop.expressions.marching import Marched, Varying
 from fabric_fenicsx.loop.inference.effects import scaled
 from fabric_fenicsx.loop.kinds.cantilever.effects import CANTILEVER_EFFECTS
+from fabric_fenicsx.loop.kinds.cantilever.terms import terms as strip_terms
 from fabric_fenicsx.loop.kinds.picture_frame.effects import PICTURE_FRAME_EFFECTS
+from fabric_fenicsx.loop.kinds.picture_frame.terms import terms as frame_terms
+from fabric_fenicsx.loop.report.discovered import Discovered, discovered_report
 from fabric_fenicsx.mechanics.laws.law import Crossing, Times
 from fabric_fenicsx.mechanics.laws.locking import Locking
 
@@ -289,3 +294,41 @@ def test_signs_of_general_forms_are_those_of_physics():
             n.parameter if isinstance(n, Times) else n for i in one.instances for n in [i["angle"]]
         ]
         assert all(p.lower >= 1 / 3 and p.share_of == "angle" for p in angles)
+
+
+@pytest.mark.parametrize(
+    ("kind", "term", "name"),
+    [
+        ("cantilever", "bending_moment_of_curvature", "nonlinear_bending"),
+        ("cantilever", "bending_moment_of_arc_length", None),
+        ("picture_frame", "even_moment_of_angle", "tension_coupling"),
+        ("picture_frame", "odd_in_rate_moment_of_rate", "rate_hardening"),
+        ("picture_frame", "dissipative_moment_of_direction", "crossover_friction"),
+        # A moment that rises is no locking.
+        ("picture_frame", "odd_moment_of_angle", None),
+    ],
+)
+def test_a_term_that_is_a_listed_effect_says_so(kind, term, name):
+    """Whatever its shape: any odd bending law is a nonlinear one. Others are kept apart by it."""
+    ranges = dict.fromkeys(
+        ("angle", "rate", "path", "time", "displacement", "speed", "acceleration", "force"), 1.0
+    )
+    ranges |= {"force_rate": 1.0, "length": 250.0, "curvature": 0.01, "x": 200.0, "z": 100.0}
+    ranges |= {"stiffness_per_C1": 1e-5, "runs": 1.0, "overhangs": 3.0}
+    every = strip_terms(ranges, ()) if kind == "cantilever" else frame_terms(ranges)
+    (effect,) = (e for e in every if e.name == term)
+    assert effect.in_general == (name or "")
+    listed = [*CANTILEVER_EFFECTS, *PICTURE_FRAME_EFFECTS]
+    fitted = SimpleNamespace(at_bound=(), errors={})
+    diagnosis = SimpleNamespace(
+        experiment=SimpleNamespace(effects=listed, terms=every, alike=frozenset()),
+        final=fitted,
+        rivals={term: ["nonlinear_bending", "crossover_friction"]},
+    )
+    own = Discovered(
+        "discovered_1", effect, replace(effect.variants[0], parameters=()), {}, None, ""
+    )
+    (said,) = discovered_report(diagnosis, [own])
+    names = [rival["name"] for rival in said["rivals"]]
+    assert sorted(names) == sorted({name or "nonlinear_bending", *diagnosis.rivals[term]})
+    assert [r["name"] for r in said["rivals"] if r.get("in_general")] == [name] * bool(name)

@@ -39,7 +39,8 @@ Picture frames and cantilevers made by a generator that shares no code with the 
 forms and differential equations, `tests/measurements`), diagnosed one by one: every listed effect
 in several forms, pairs, none, effects on no list, rivals, outliers. An answer is right where the
 verdict is (of an effect on no list both that nothing explains it and that a term was discovered),
-and where each name is, itself or as a rival named with it. `before` and `after` are
+and where each name is, itself, as a rival named with it or as what a term without a formula is
+whatever its shape (`in_general` in the report). `before` and `after` are
 held-out errors over the noise put in; `expected` is what the fit itself expects of `after`, from
 the uncertainty of its parameters, where whole runs are held out. Written by
 `tests/measurements/table.py --page`.
@@ -71,6 +72,7 @@ class Row:
     truth: Truth
     verdict: str
     effects: tuple[str, ...]
+    in_general: frozenset[str]
     rivals: dict[str, list[str]]
     before: float
     after: float
@@ -81,6 +83,9 @@ class Row:
         # A term without a formula may have come near an effect on no list; its name is not judged.
         allowed = [self.truth.verdict]
         allowed += ["effect_discovered"] * (self.truth.verdict == "unexplained")
+        if self.verdict == "effect_discovered" and all(self.in_general):
+            # A term that is the effect, whatever its shape.
+            return allowed[-1] == self.verdict or self.in_general in self.truth.acceptable
         if self.verdict not in allowed:
             return False
         choices = product(*[(name, *self.rivals[name]) for name in self.effects])
@@ -122,7 +127,7 @@ def rows(
                     found = diagnose_test(experiment)
                 except SolveError:
                     nothing = (float("nan"), float("nan"))
-                    yield Row(seed, recipe.name, truth, "not fitted", (), {}, *nothing)
+                    yield Row(seed, recipe.name, truth, "not fitted", (), frozenset(), {}, *nothing)
                     continue
             yield Row(
                 seed,
@@ -130,6 +135,7 @@ def rows(
                 truth,
                 found.verdict,
                 tuple(effect.name for effect in found.effects),
+                frozenset(e.name if e.listed else e.in_general for e in found.effects),
                 found.rivals,
                 found.holdout_before / truth.noise,
                 found.holdout_after / truth.noise,

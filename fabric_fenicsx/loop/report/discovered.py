@@ -297,6 +297,11 @@ def discovered_report(d: Diagnosis, terms: Sequence[Discovered]) -> list[dict[st
             return {"name": name}
         return {"acts_on": other.acts_on, "depends_on": list(other.depends_on)}
 
+    def rivals(effect: Effect) -> list[dict[str, Any]]:
+        own = effect.in_general
+        others = [rival(name) for name in d.rivals.get(effect.name, []) if name != own]
+        return [{"name": own, "in_general": True}] * bool(own) + others
+
     errors = d.final.errors
     reported = []
     for term in terms:
@@ -311,7 +316,7 @@ def discovered_report(d: Diagnosis, terms: Sequence[Discovered]) -> list[dict[st
                 "shape": f"{term.name}.csv",
                 "formula": term.formula,
                 "file": f"{term.name}.py",
-                "rivals": [rival(name) for name in d.rivals.get(term.effect.name, [])],
+                "rivals": rivals(term.effect),
                 "variant": term.variant.label,
                 "meaning": term.effect.meaning,
                 "of": term.effect.name,

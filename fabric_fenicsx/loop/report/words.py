@@ -156,14 +156,19 @@ def _discovered(report: Mapping[str, Any], before: str, after: str, scatter: str
 
 def _not_told(term: Mapping[str, Any]) -> str:
     """What readings cannot tell a term from, in a sentence."""
-    listed = [r["name"] for r in term["rivals"] if "name" in r]
+    in_general = [r["name"] for r in term["rivals"] if r.get("in_general")]
+    listed = [r["name"] for r in term["rivals"] if "name" in r and r["name"] not in in_general]
     others = [r for r in term["rivals"] if "name" not in r]
     if not term["one_curve"]:
         words = [*listed, *(f"the {_acts_on(r)} by {_variables(r)}" for r in others)]
-        return f" This data cannot tell {term['name']} from {one_of(list(dict.fromkeys(words)))}."
+        words = list(dict.fromkeys(words))
+        text = f" This data cannot tell {term['name']} from {one_of(words)}." if words else ""
+        is_one = "".join(f" It is {name} in a form that is on no list." for name in in_general)
+        return is_one + text
     # Laws of all kinds: a long list would only hide that nothing is known of it.
     of = [*term["depends_on"], *(name for r in others for name in r["depends_on"])]
     variables = _listed([v.replace("_", " ") for v in dict.fromkeys(of)])
+    listed = list(dict.fromkeys([*in_general, *listed]))
     known = f" It may be {one_of(listed)} in a form that was not tried." if listed else ""
     return (
         f" The readings go one way at one speed: they know the curve of that {_acts_on(term)}, and "

@@ -54,6 +54,7 @@ def strip_effect(
     depends_on: tuple[str, ...],
     forms: Iterable[StripVariant],
     general_form_of: tuple[str, ...] = (),
+    in_general: str = "",
     of_two: bool = False,
 ) -> Effect:
     """A term of its forms."""
@@ -66,6 +67,7 @@ def strip_effect(
         acts_on=acts_on,
         depends_on=depends_on,
         general_form_of=general_form_of,
+        in_general=in_general,
         of_two=of_two,
     )
 

@@ -192,8 +192,10 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         )
         for label, parameters, g in splines(name, SPLINES)
     ]
-    about, of = "any odd law of the curvature", ("nonlinear_bending",)
-    yield strip_effect(name, about, "bending_moment", ("curvature",), forms, of)
+    about, of = "any odd law of the curvature", "nonlinear_bending"
+    yield strip_effect(
+        name, about, "bending_moment", ("curvature",), forms, general_form_of=(of,), in_general=of
+    )
 
     for acts_on, unit, about in on_the_strip(ranges):
         # A weight that is even is no other than B, and a curvature has nothing to stand for it.

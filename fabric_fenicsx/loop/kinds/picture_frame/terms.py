@@ -63,6 +63,14 @@ CYCLES = {
 OVERTONES = {"time": (0, 2), "angle": (0, 2)}
 
 
+IN_GENERAL = {
+    "dissipative_moment_of_direction": "crossover_friction",
+    "even_moment_of_angle": "tension_coupling",
+    "odd_in_rate_moment_of_rate": "rate_hardening",
+}
+"""Listed effects that terms are, whatever their shape."""
+
+
 def terms(
     ranges: Mapping[str, float],
     ends: Ends = MappingProxyType({}),
@@ -150,6 +158,7 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
                 of_fabric=not base.startswith("even"),
                 acts_on="moment",
                 depends_on=depends_on,
+                in_general=IN_GENERAL.get(name, ""),
             )
 
 
