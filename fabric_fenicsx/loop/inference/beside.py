@@ -8,14 +8,43 @@ from ...errors import SolveError
 from .effects import Effect, Variant
 from .experiment import Experiment, each_by_itself
 from .fitting import Fit
+from .screen import Signatures
 from .starts import Combination, Signature, signatures
 
-__all__ = ["by_itself", "forms_beside"]
+__all__ = ["by_itself", "forms_beside", "signed"]
 
 
 def by_itself(forms: Mapping[Variant, Sequence[Signature]]) -> list[Combination]:
     """Each shape of each form of an effect."""
     return [((variant, shape),) for variant, shapes in forms.items() for shape in shapes]
+
+
+def signed(experiment: Experiment, model: Fit, effects: Sequence[Effect]) -> Signatures:
+    """A model's sensitivities to each form of some effects, where specimens are alike.
+
+    Forms with a parameter that the model has are left out.
+
+    Raises:
+        SolveError: the model has no solution there.
+    """
+    expected, slopes = experiment.predict(model.variants, model.values)
+    known = set(model.values)
+    forms = [
+        (effect, variant)
+        for effect in effects
+        for variant in effect.variants
+        if known.isdisjoint(p.name for p in variant.parameters)
+    ]
+    every = each_by_itself(
+        experiment,
+        lambda form: signatures(experiment, model, expected, slopes, form[1]),
+        forms,
+        [expected, *slopes.values()],
+    )
+    found: dict[Effect, dict[Variant, list[Signature]]] = {effect: {} for effect in effects}
+    for (effect, variant), own in zip(forms, every, strict=True):
+        found[effect][variant] = own
+    return found
 
 
 def forms_beside(
@@ -26,25 +55,8 @@ def forms_beside(
     None where there is no such model: as specimens differ some of them may have a solution that
     what they have in common has not.
     """
-    values = set(model.values)
     try:
-        expected, slopes = experiment.predict(model.variants, model.values)
+        every = signed(experiment, model, effects)
     except SolveError:
         return []
-    forms = [
-        variant
-        for effect in effects
-        for variant in effect.variants
-        if values.isdisjoint(p.name for p in variant.parameters)
-    ]
-    every = each_by_itself(
-        experiment,
-        lambda variant: signatures(experiment, model, expected, slopes, variant),
-        forms,
-        [expected, *slopes.values()],
-    )
-    return [
-        ((variant, shape),)
-        for variant, shapes in zip(forms, every, strict=True)
-        for shape in shapes
-    ]
+    return [one for forms in every.values() for one in by_itself(forms)]

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 
 from ...errors import SolveError
 from ..kept import Kept
-from .beside import by_itself, forms_beside
+from .beside import by_itself, forms_beside, signed
 from .choice import chosen_model, in_place_of, models_instead, verdict_on
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
@@ -29,7 +29,7 @@ from .noise import quantum
 from .notes import errors_beside, noise_source, notes_of
 from .rivals import pairs_of, rivals_of
 from .screen import Screen, Signatures
-from .starts import Combination, ToFirstOrder, signatures
+from .starts import Combination, ToFirstOrder
 from .variances import Variances
 
 __all__ = ["Search"]
@@ -325,12 +325,7 @@ class Search:
 
     def _signed(self, effects: Sequence[Effect]) -> Signatures:
         """The baseline's sensitivities to each form of some effects."""
-        base = self.models.base
-        alike = self.experiment.predict((), base.values)
-        return {
-            effect: {v: signatures(self.experiment, base, *alike, v) for v in effect.variants}
-            for effect in effects
-        }
+        return signed(self.experiment, self.models.base, effects)
 
     def _screened(self) -> Screen:
         """All effects to first order about the baseline, with the variances as they are now."""

@@ -88,9 +88,14 @@ class Cantilever:
     curves_only = False
     terms_are_rivals = False
     in_copies = True
-    # A camera that is turned sees a strip that is tilted, but for how that bends.
+    # A camera that is turned sees a strip that is tilted, but for how that bends; a picture that is
+    # too large, or larger for some overhangs, a strip that bends more than it does.
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType(
-        {"clamp_tilt": ("reading_of_distance",)}
+        {
+            "clamp_tilt": ("reading_of_distance",),
+            "nonlinear_bending": ("reading_of_height", "reading_of_length"),
+            "residual_curvature": ("reading_of_height", "reading_of_length"),
+        }
     )
 
     def __init__(
