@@ -14,7 +14,8 @@ from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.variances import Variances
-from fabric_fenicsx.loop.kinds.cantilever import CantileverRig
+from fabric_fenicsx.loop.kinds.cantilever import CantileverRig, hanging
+from fabric_fenicsx.loop.kinds.cantilever.compared import HungStrips, places_on
 from fabric_fenicsx.loop.kinds.cantilever.hanging import HangingTows, Tow
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
@@ -244,6 +245,62 @@ def test_no_balance_is_told():
     tow = HangingTows([Tow(LENGTH, WIDTH, HEIGHT, SPACING, WEIGHT)])
     with pytest.raises(SolveError, match="a strip of 250 mm finds no balance"):
         tow.solve({"C1_MPa": 0.0})
+
+
+def test_tows_side_by_side_hang_as_each_does_alone(exact, monkeypatch):
+    """Also where one of them comes to rest only with its weight put on step by step."""
+    variants = (
+        *form(exact, ("nonlinear_bending", "hyperbolic")),
+        *form(exact, ("clamp_compliance", "linear")),
+        *form(exact, ("residual_curvature", "constant")),
+    )
+    laws = exact._laws(variants, False)
+    tows = [Tow(length, WIDTH, HEIGHT, SPACING, WEIGHT) for length in (90.0, 250.0, 170.0)]
+    # The long one is all but without stiffness: from straight no step of Newton's gets there.
+    C1 = np.array([[B], [WEIGHT * LENGTH**3 / 8000.0], [0.5 * B]]) / PER_C1
+    others = {"m_s_N": SOFT["m_s_N"], "kappa_s_1_mm": CRITICAL, "compliance_rad_per_N": 0.4}
+    others["m_s_N"] = np.array([[0.04], [1e-6], [0.02]])
+    others["kappa0_1_mm"] = np.array([[0.0], [0.0], [1e-3]])
+    # Eight iterations would do.
+    monkeypatch.setattr(hanging, "LIMIT", 6)
+    one_by_one = HangingTows._one_by_one
+    asked = []
+    monkeypatch.setattr(
+        HangingTows, "_one_by_one", lambda own, phi: asked.append(own) or one_by_one(own, phi)
+    )
+    found = HangingTows(tows).solve({"C1_MPa": C1, **others}, laws)
+    assert asked and found.z[1, -1] < -0.7 * 250.0
+    for k, tow in enumerate(tows):
+        own = {n: v[k].item() if isinstance(v, np.ndarray) else v for n, v in others.items()}
+        alone = HangingTows([tow]).solve({"C1_MPa": C1[k].item(), **own}, laws)
+        for one, other in ((found.x[k], alone.x[0]), (found.z[k], alone.z[0])):
+            assert one == pytest.approx(other, abs=1e-9)
+        assert set(found.slopes) == set(alone.slopes) == {"C1_MPa", *others}
+        for name, slope in alone.slopes.items():
+            size = np.abs(slope).max()
+            assert found.slopes[name][:, k] == pytest.approx(slope[:, 0], abs=1e-7 * size)
+
+
+def test_the_nearest_point_of_a_line_is_found():
+    """As among a hundred thousand points of it; where it is known the arc length is taken."""
+    tow = HangingTows([Tow(length, WIDTH, HEIGHT, SPACING, WEIGHT) for length in (120.0, LENGTH)])
+    shape = tow.solve({"C1_MPa": 0.3 * B / PER_C1}, slopes=False)
+    lines = [CubicSpline(tow.arc[k], np.stack([shape.x[k], shape.z[k]], 1)) for k in (0, 1)]
+    rng = np.random.default_rng(3)
+    of, share = rng.integers(0, 2, 60), rng.uniform(0.0, 1.0, 60)
+    share[:3] = 0.0, 1.0, 1.0
+    s = share * np.where(of == 0, 120.0, LENGTH)
+    places = np.array([lines[k](at) for k, at in zip(of, s, strict=True)])
+    places += rng.normal(0.0, 1.5, places.shape)
+    known = np.where(np.arange(60) % 7 == 5, s, np.nan)
+    count = np.arange(60)
+    own = HungStrips(tow, np.zeros(2, int), False, count, of, of, known, *places.T)
+    found = places_on(own, shape.x, shape.z)
+    for k, at in enumerate(found):
+        fine = np.linspace(0.0, tow.arc[of[k], -1], 100_001)
+        away = np.linalg.norm(lines[of[k]](fine) - places[k], axis=1)
+        nearest = known[k] if np.isfinite(known[k]) else fine[np.argmin(away)]
+        assert at == pytest.approx(nearest, abs=2e-3)
 
 
 def test_a_strip_wound_up_does_not_spoil_the_next(exact):
