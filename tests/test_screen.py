@@ -1,5 +1,6 @@
 """Effects judged to first order: the drop of the sum of squares of explicit least squares."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -8,6 +9,8 @@ from linear import Linear, covariance, linear_effect, readings
 from scipy.stats import chi2
 
 from fabric_fenicsx.inputs.parameters import Parameter
+from fabric_fenicsx.loop.inference import starts
+from fabric_fenicsx.loop.inference.criteria import CRITERIA
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.noise import Noise
@@ -101,6 +104,36 @@ def test_where_not_all_are_followed_no_kind_has_all_the_starts():
     assert followed(None).count("many") == len(powers)
     assert sorted(followed(3)) == ["cosine", "kink", "many", "many"]
     assert set(followed(1)) == {"many"}
+
+
+def test_of_many_starts_the_most_promising_are_fitted_and_the_best_to_the_end(monkeypatch):
+    t = np.linspace(0.0, 1.0, 40)
+    scales = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0]
+    columns = {"a": np.ones_like(t), "b": t}
+    columns |= {f"p{k}": np.exp(-scale * t) for k, scale in enumerate(scales)}
+    powers = [name for name in columns if name.startswith("p")]
+    forms = tuple(Variant(name, (Parameter(name, amplitude=True),)) for name in powers)
+    effects = [Effect("fading", "linear", "", forms)]
+    observed = 2.0 + t + 3.0 * np.exp(-4.0 * t) + 1e-3 * np.random.default_rng(1).normal(size=40)
+    test = Linear(readings(observed), columns, ("a", "b"), effects=effects)
+    variances = Variances(NOISE)
+    base = fit(test, (), {"a": 1.0, "b": 1.0}, test.readings.fit, variances)
+    alike = test.predict((), base.values)
+    combos = [((v, s),) for v in forms for s in signatures(test, base, *alike, v)]
+
+    def fitted(**limits):
+        few = replace(CRITERIA, far_off=np.inf, worthwhile=np.inf, **limits)
+        monkeypatch.setattr(starts, "CRITERIA", few)
+        found = fit_combinations(test, base, combos, variances)
+        return {f.variants[-1].label: f for f in found}
+
+    every = fitted(looks=len(powers))
+    size = {name: f.sum_of_squares for name, f in every.items()}
+    best = sorted(size, key=size.get)
+    assert set(every) == set(powers) and best[0] == "p2"
+    assert set(fitted(looks=3)) == set(best[:3])
+    some = fitted(first_look=1, ends=2)
+    assert {name for name, f in some.items() if f.converged} == set(best[:2])
 
 
 def left(test, base, names):
