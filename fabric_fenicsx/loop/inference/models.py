@@ -24,7 +24,7 @@ FIRST_SCATTER = 0.1
 #: ... and where they are taken to be all but alike.
 ALIKE = 0.01
 #: Forms whose own variances are looked for, beside the best ones of each set of effects.
-MOST_NEAR, OF_A_SET = 6, 2
+MOST_NEAR, OF_A_SET = 16, 2
 #: Models whose parameters are fitted again with their own variances ...
 REFINED = 3
 #: ... if their criterion is within this of the best.
