@@ -125,6 +125,22 @@ def test_what_specimens_visibly_differ_by_may_be_a_further_effect(own_way, apart
     assert own.may_be_one_more(model) is not settled
 
 
+@pytest.mark.parametrize(("apart", "name"), [(0.0, "kink"), (0.4, "product")])
+def test_what_differs_between_specimens_may_go_by_two_variables(apart, name):
+    """A term that leaves noise only as its specimens are unusually different is not the last."""
+    share = 1.0 + apart * np.repeat(np.array([1.0, -1.0, 0.5, -0.5]), EACH)
+    columns = {
+        "kink": lambda t: np.maximum(t - 0.6, 0.0),
+        "product": lambda t: share * np.maximum(t - 0.6, 0.0),
+    }
+    effects = [
+        replace(linear_effect(own, acts_on="reading"), of_two=own == "product") for own in columns
+    ]
+    test = made(columns, lambda t: 3.0 * columns["product"](t), effects)
+    own = search(test)
+    assert own.accounted and [e.name for e in own.found.effects] == [name]
+
+
 @pytest.mark.parametrize(("times", "gives_way"), [(1.4, False), (1.6, True)])
 def test_three_effects_are_not_fitted_where_a_term_leaves_far_less_than_two(times, gives_way):
     test = made({"kink": lambda t: t**2}, lambda t: 3.0 * t**2, [linear_effect("kink")])

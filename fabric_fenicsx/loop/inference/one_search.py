@@ -275,7 +275,8 @@ class Search:
             ranked = screen.most_promising(len(tried) + CRITERIA.glimpsed)
             later = self._after_a_glimpse(screen, self._signatures, ranked[len(tried) :])
             levels[1] = sorted([*levels[1], *later], key=lambda m: m.criterion)
-        if self._of_two and not self._settled(_nearest(levels), levels[0][0]):
+        best = _nearest(levels)
+        if self._of_two and (not self._settled(best, levels[0][0]) or self.judge.uneven(best.fit)):
             of_two = self._over_two_variables(candidates)
             levels[1] = sorted([*levels[1], *of_two], key=lambda m: m.criterion)
         for candidate in candidates:
