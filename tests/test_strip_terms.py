@@ -441,6 +441,20 @@ def test_a_picture_may_be_larger_for_long_overhangs():
         assert moved == pytest.approx([0.0, -30.0 * share], abs=1e-6)
 
 
+def test_a_camera_before_the_middle_of_each_overhang():
+    """A line of its own bow: nothing in the middle, and on either side as far from there."""
+    ranges = {"length": LENGTH, "curvature": 0.01, "x": 100.0, "z": 90.0}
+    found = next(t for t in terms(ranges, ()) if t.name == "reading_of_distance_and_length")
+    form = next(v for v in found.variants if v.label == "about the middle")
+    values = {f"{found.name}_tilt_mm": 0.2, f"{found.name}_bow_mm": 3.0}
+    for length in (100.0, LENGTH):
+        for off in (-30.0, 0.0, 30.0):
+            at = {"x": length / 2.0 + off, "z": -5.0, "length": length}
+            out, up = (float(as_ufl(v)) for v in form.camera(values, at))
+            u = off / (LENGTH / 2.0)
+            assert out == 0.0 and up == pytest.approx(0.2 * u + 3.0 * u**2)
+
+
 @pytest.mark.parametrize(
     ("overhangs", "labels"),
     [

@@ -332,6 +332,7 @@ class Cantilever:
             "from_the_free_end_mm": self._length - arc,
             "length_mm": self._length,
             "distance_mm": self._distance,
+            "from_the_middle_mm": self._distance - self._length / 2.0,
             "from_the_clamp_mm": np.hypot(self._distance, self._observed),
             "height_mm": np.abs(self._observed),
             "run": self._run + 1.0,

@@ -4,6 +4,7 @@ One is a place along the strip, or a place or a height in the picture, and enter
 the other, the run or the overhang, there is a shape g as of terms over one variable:
 
     (x, z) + g (−z, x),  z + x g,  z (1 + g)    what the camera sees
+    z + a u + b u²,  u = (2x − L)/L_max         one that stands before the middle of each overhang
     κ0 = s g,  w (1 + s g),  M = B κ e^(−s g)   what acts on the strip, or with e^(−s/r) for s
     M = B κ e^(−g |κ|/(|κ| + κ₁))               a law that changes from run to run
     M = B κ e^(−s g(|κ|/(|κ| + κ₁)))            or along the strip
@@ -58,7 +59,9 @@ def products(ranges: Mapping[str, float]) -> Iterator[Effect]:
     Args:
         ranges: see ``terms``; without two "runs" before one there are none by the run.
     """
-    yield from _turned_by("length", ranges["length"], partial(splines, counts=SPLINES))
+    yield from _turned_by(
+        "length", ranges["length"], partial(splines, counts=SPLINES), _about_the_middle
+    )
     yield _law_along_the_strip(ranges["length"], ranges["curvature"])
     last = ranges.get("runs", 0.0)
     if last < FEWEST_BEFORE:
@@ -153,7 +156,10 @@ def _from_a_place(name: str, longest: float) -> tuple[str, tuple[Parameter, ...]
 
 
 def _turned_by(
-    variable: str, most: float, drawn: Callable[[str], Iterator[Drawn]]
+    variable: str,
+    most: float,
+    drawn: Callable[[str], Iterator[Drawn]],
+    more: Callable[[str, float], StripVariant] | None = None,
 ) -> Iterator[Effect]:
     name = f"reading_of_distance_and_{variable}"
     forms = [
@@ -166,8 +172,24 @@ def _turned_by(
         for words, seen in (("turned", _turned), ("sheared", _sheared))
         for label, parameters, g in drawn(name)
     ]
+    if more is not None:
+        forms.append(more(name, most))
     about = f"a camera that is turned more or less by the {CALLED[variable]}"
     yield strip_effect(name, about, "reading", ("distance", variable), forms)
+
+
+def _about_the_middle(name: str, longest: float) -> StripVariant:
+    """Of a camera that was moved to the middle of each overhang and sees lines bowed about it."""
+    tilt, bow = (Parameter(f"{name}_{of}_mm", amplitude=True) for of in ("tilt", "bow"))
+
+    def g(p: Values, u: Any) -> Any:
+        return p[tilt.name] * u + p[bow.name] * u**2
+
+    def camera(p: Values, at: Values) -> tuple[Any, Any]:
+        return 0.0, g(p, (2.0 * at["x"] - at["length"]) / longest)
+
+    shape = Shape("from_the_middle_mm", "height_mm", longest / 2.0, g, ends=(-1.0, 1.0))
+    return StripVariant("about the middle", (tilt, bow), shape=shape, camera=camera)
 
 
 def _turns_of_runs(name: str, last: float) -> Iterator[Drawn]:
