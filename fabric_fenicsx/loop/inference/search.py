@@ -126,8 +126,8 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
     search.judge.compared = True
     final = search.judge.weighed(chosen.fit, chosen.effects)
     gain = final.criterion - other.criterion_after
-    if _at_the_edge(other.final):
-        # It may stand for another law as well as they.
+    if _at_the_edge(other.final) or any(effect.of_two for effect in other.effects):
+        # It may stand for another law as well as they, or is no simpler than two of them.
         least = CRITERIA.decisive
     one = other.effects[0] if len(other.effects) == 1 else None
     if single.accounted and one is not None and not one.listed:
