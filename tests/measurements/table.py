@@ -83,9 +83,9 @@ class Row:
         # A term without a formula may have come near an effect on no list; its name is not judged.
         allowed = [self.truth.verdict]
         allowed += ["effect_discovered"] * (self.truth.verdict == "unexplained")
-        if self.verdict == "effect_discovered" and all(self.in_general):
+        if self.verdict == "effect_discovered" and self.in_general in self.truth.acceptable:
             # A term that is the effect, whatever its shape.
-            return allowed[-1] == self.verdict or self.in_general in self.truth.acceptable
+            return True
         if self.verdict not in allowed:
             return False
         choices = product(*[(name, *self.rivals[name]) for name in self.effects])

@@ -271,6 +271,7 @@ def fit(
         deviations: of the specimens to begin with; by default none.
         evaluations: of the model at most.
         robust: a white residual beyond which readings count less and less; None for least squares.
+            Robust fits are ranked, or begun from, and end when they are nearly there.
 
     Raises:
         SolveError: the model has no solution at the start.

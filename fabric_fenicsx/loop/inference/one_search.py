@@ -248,7 +248,7 @@ class Search:
         """Candidates by themselves, and models of no effect and of one."""
         self.progress(0.0, "signatures")
         base = self.models.base = self.models.baseline(self.models.start)
-        self._signatures, self.models.forms = self._signed(self.effects), {}
+        self._signatures, self.models.forms = signed(self.experiment, base, self.effects), {}
         screen = self._screened()
         levels = [[self.models.refined(self.judge.weighed(base, ()))]]
         if not self.effects:
@@ -300,7 +300,7 @@ class Search:
 
     def _over_two_variables(self, candidates: list[Candidate]) -> list[Model]:
         """Models of the most promising terms over two variables, which join the candidates."""
-        signs = self._signed(self._of_two)
+        signs = signed(self.experiment, self.models.base, self._of_two)
         screen = self._screen(signs)
         found = self._after_a_glimpse(screen, signs, screen.most_promising(CRITERIA.glimpsed))
         tried = list(dict.fromkeys(model.effects[0] for model in found))
@@ -323,10 +323,6 @@ class Search:
         for effect in sorted(left, key=lambda one: left[one])[: CRITERIA.products]:
             found += self.models.fitted(by_itself(signs[effect]), starts=1)
         return self.models.ranked(found)
-
-    def _signed(self, effects: Sequence[Effect]) -> Signatures:
-        """The baseline's sensitivities to each form of some effects."""
-        return signed(self.experiment, self.models.base, effects)
 
     def _screened(self) -> Screen:
         """All effects to first order about the baseline, with the variances as they are now."""

@@ -45,6 +45,11 @@ class HungStrips:
     z: Array
 
     @property
+    def read(self) -> Array:
+        """Places as they were read [mm], (n, 2)."""
+        return np.stack([self.x, self.z], axis=1)
+
+    @property
     def lengths(self) -> Array:
         """Of the readings' tows [mm], (n,)."""
         return self.tows.arc[self.tow, -1]
@@ -64,23 +69,22 @@ def expected_heights(
     """
     # Of the places and of what they change by at once: they have the same nodes.
     every = _through(own, np.stack([np.stack([x, z]), *slopes.values()]))
-    line = _Lines(own, every.pieces[:, :, :, 0])
-    at = _places_on(line, x, z)
-    readings = np.stack([own.x, own.z], axis=1)
-    along = line(at, 1)
-    along /= np.linalg.norm(along, axis=1)[:, None]
+    at = _places_on(_Lines(own, every.pieces[:, :, :, 0]), x, z)
+    values, rates, _ = every(at)
+    line, along = values[:, 0], rates[:, 0]
+    along = along / np.linalg.norm(along, axis=1)[:, None]
     free = np.isnan(own.s)
     normal = np.tile([0.0, 1.0], (len(at), 1))
     stands_for = np.sqrt(1.0 + steepness[own.rows[free]] ** 2)
     normal[free] = np.stack([-along[free, 1], along[free, 0]], axis=1) * stands_for[:, None]
-    away = readings - line(at)
+    away = own.read - line
     expected = own.z - np.einsum("nd,nd->n", normal, away)
     if not slopes:
         return expected, {}
     # The place on the line moves as well, but only along it; beyond the ends of the line a
     # reading is compared with its tangent, which turns.
     beyond = np.einsum("nd,nd->n", along, away) * free
-    change = (every(at) + beyond[:, None, None] * every(at, 1))[:, 1:]
+    change = (values + beyond[:, None, None] * rates)[:, 1:]
     changes = np.einsum("nkd,nd->kn", change, normal)
     return expected, dict(zip(slopes, changes, strict=True))
 
@@ -106,10 +110,10 @@ def _places_on(line: _Lines, x: Array, z: Array) -> Array:
     # The nearest point is in one of the cells at the nearest node.
     least = arc[tow, np.maximum(node - 1, 0)]
     most = arc[tow, np.minimum(node + 1, arc.shape[1] - 1)]
-    readings = np.stack([own.x, own.z], axis=1)
-    s = arc[tow, node]
+    s, read = arc[tow, node], own.read
     for _ in range(ITERATIONS):
-        gap, tangent, bend = line(s) - readings, line(s, 1), line(s, 2)
+        place, tangent, bend = line(s)
+        gap = place - read
         fall = np.einsum("nd,nd->n", gap, tangent)
         rise = np.einsum("nd,nd->n", gap, bend) + np.einsum("nd,nd->n", tangent, tangent)
         s = np.clip(s - fall / np.maximum(rise, 0.1), least, most)
@@ -128,19 +132,16 @@ class _Lines:
     own: HungStrips
     pieces: Array
 
-    def __call__(self, s: Array, derivative: int = 0) -> Array:
-        """At these arc lengths of the readings [mm], (n, .., n_components)."""
+    def __call__(self, s: Array) -> tuple[Array, Array, Array]:
+        """At arc lengths of the readings [mm], and two derivatives, (n, .., n_components) each."""
         lengths = self.own.lengths
         share = s / lengths
         piece = np.clip(np.searchsorted(SHARES, share, side="right") - 1, 0, len(SHARES) - 2)
         a, b, c, d = self.pieces[:, piece, self.own.tow]
         room = (-1, *[1] * (a.ndim - 1))
         u, per_length = (share - SHARES[piece]).reshape(room), 1.0 / lengths.reshape(room)
-        if derivative == 0:
-            return np.asarray(((a * u + b) * u + c) * u + d)
-        if derivative == 1:
-            return np.asarray(((3.0 * a * u + 2.0 * b) * u + c) * per_length)
-        return np.asarray((6.0 * a * u + 2.0 * b) * per_length**2)
+        rate = ((3.0 * a * u + 2.0 * b) * u + c) * per_length
+        return ((a * u + b) * u + c) * u + d, rate, (6.0 * a * u + 2.0 * b) * per_length**2
 
 
 def _through(own: HungStrips, nodes: Array) -> _Lines:

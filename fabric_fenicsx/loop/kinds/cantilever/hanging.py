@@ -255,9 +255,9 @@ class HangingTows:
         """The cells at angles of the nodes, with so much of the weight."""
         C1, B = self._values["C1_MPa"], self._values["B"]
         kappa = np.diff(angles) / self._cell
-        added = self._moments(kappa) if self._laws.bend else None
         moment, rigidity = B * kappa, B
-        if added is not None:
+        if self._laws.bend:
+            added = self._moments(kappa)
             moment = moment + added.value
             rigidity = rigidity + added.slopes.get("kappa", 0.0)
         mean = (angles[:, 1:] + angles[:, :-1]) / 2.0

@@ -246,19 +246,22 @@ class Cantilever:
         In units of its length such a strip depends on w L³/B alone, but for a stretch of no
         account: one strip that softens step by step gives them all.
         """
-        every = [tow for own in self._strips for tow in own.tows.tows]
-        longest = max((HangingTows([tow]) for tow in every), key=lambda tow: tow.load_per_C1.item())
-        load_per_C1 = longest.load_per_C1.item()
+        every = [
+            (load, tow)
+            for own in self._strips
+            for load, tow in zip(own.tows.load_per_C1[:, 0].tolist(), own.tows.tows, strict=True)
+        ]
+        load_per_C1, tow = max(every, key=lambda one: one[0])
+        longest = HangingTows([tow])
         lines = []
         for load in LOADS:
             try:
                 shape = longest.solve({"C1_MPa": load_per_C1 / load}, slopes=False)
             except SolveError:
                 break
-            lines.append(np.concatenate([shape.x, shape.z]) / longest.arc[0, -1])
+            lines.append(np.concatenate([shape.x, shape.z]) / tow.length)
         if not lines:
-            length = longest.tows[0].length
-            raise SolveError(f"a strip of {length:g} mm does not hang at any stiffness")
+            raise SolveError(f"a strip of {tow.length:g} mm does not hang at any stiffness")
         loads, table = LOADS[: len(lines)], np.array(lines)
         misses = []
         for load in loads:
