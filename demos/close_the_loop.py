@@ -14,7 +14,7 @@
 # python demos/close_the_loop.py
 # ```
 #
-# Under four minutes on one core; `docs` behind it puts the figure into `docs/images`. Of your own
+# A minute and a half on one core; `docs` behind it puts the figure into `docs/images`. Of your own
 # measurements steps 2 and 3 are two commands:
 #
 # ```
