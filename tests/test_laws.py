@@ -421,6 +421,9 @@ def test_moments_on_one_way_alone(base, gamma, before, moment):
         {"base": "outward", "variable": "rate", "reach": 0.1},
         {"base": "forward", "variable": "rate", "reach": 0.1},
         {"base": "flowing", "variable": "angle", "exponent": 3.0, "flow_rate_rad_s": 0.02},
+        {"base": "smooth", "variable": "broken", "reach": 1.0, "memory_s": 2.0, "constant": 0.5},
+        {"base": "dissipative", "variable": "healed", "reach": 1.0, "wear_angle_deg": 2.0},
+        {"base": "above", "variable": "angle", "shape": "corner", "place": 0.2},
     ],
     ids=[
         "state of rest",
@@ -430,6 +433,9 @@ def test_moments_on_one_way_alone(base, gamma, before, moment):
         "way out",
         "way on",
         "flow",
+        "structure",
+        "rest",
+        "one side",
     ],
 )
 def test_other_factors_are_the_same_in_both(numbers):

@@ -9,6 +9,7 @@ from linear import Linear, linear_effect, readings
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.inputs.parameters import Parameter
+from fabric_fenicsx.loop.inference import one_search
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
 from fabric_fenicsx.loop.inference.fitting import fit
@@ -68,6 +69,43 @@ def test_forms_are_looked_at_again_when_noise_is_known():
     assert {m.fit.variants[0].label for m in at_first} == {"near", "nearer"}
     assert models.ranked(fits)[0].fit.variants[0].label == "all"
     assert models.variances is loud, "which other fits are compared by"
+
+
+def of_two_bends():
+    """A search for a kink, where a wave does nearly as well, that has been made."""
+    columns = {"kink": lambda t: np.maximum(t - 0.6, 0.0), "wave": lambda t: t**3}
+    return search(made(columns, columns["kink"], [linear_effect(name) for name in columns]))
+
+
+def test_a_fit_that_loses_at_its_end_is_compared_again(monkeypatch):
+    own = of_two_bends()
+    levels = [[own.judge.weighed(own.models.base, ())], list(own.singles)]
+    kink, wave = own.effects
+    assert [m.effects for m in levels[1]][:2] == [(kink,), (wave,)]
+    last = own.models.last
+    monkeypatch.setattr(
+        own.models,
+        "last",
+        lambda m: replace(last(m), criterion=m.criterion + 1e4 * (m.effects == (kink,))),
+    )
+    monkeypatch.setattr(one_search, "verdict_on", lambda *models: "effect_found")
+    chosen, _, final, _ = own._chosen_of(levels)
+    assert chosen.effects == final.effects == (wave,)
+
+
+def test_what_wins_as_a_rival_is_chosen(monkeypatch):
+    """In the place of one of two effects another may do what was not tried before."""
+    own = of_two_bends()
+    levels = [[own.judge.weighed(own.models.base, ())], list(own.singles)]
+    kink, wave = own.effects
+    best = next(m for m in levels[1] if m.effects == (kink,))
+    levels[1].remove(best)
+    tried = iter([{wave: {kink: [best]}}, {}])
+    monkeypatch.setattr(one_search, "in_place", lambda *models: next(tried))
+    monkeypatch.setattr(one_search, "verdict_on", lambda *models: "effect_found")
+    chosen, _, final, _ = own._chosen_of(levels)
+    assert chosen.effects == final.effects == (kink,)
+    assert best in levels[1]
 
 
 class OnlyAsSpecimensDiffer(Linear):

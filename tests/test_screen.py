@@ -106,6 +106,29 @@ def test_where_not_all_are_followed_no_kind_has_all_the_starts():
     assert set(followed(1)) == {"many"}
 
 
+def test_a_form_with_many_numbers_has_to_leave_less():
+    """Where few forms of an effect are followed, those of waves enough for any noise are not."""
+    t = np.linspace(0.0, 1.0, 60)
+    waves = {f"w{k}": np.sin((k + 2) * 4.0 * t) for k in range(10)}
+    columns = {"a": np.ones_like(t), "b": t, "kink": np.maximum(t - 0.5, 0.0)} | waves
+    long = [
+        Variant(label, tuple(Parameter(name, amplitude=True) for name in ("kink", *names)))
+        for label, names in (("ten waves", waves), ("nine waves", [*waves][:9]))
+    ]
+    forms = (*long, Variant("short", (Parameter("kink", amplitude=True),)))
+    effects = [Effect("kink", "linear", "", forms)]
+    observed = 2.0 + t + 4.0 * columns["kink"] + 0.1 * np.random.default_rng(7).normal(size=60)
+    test = Linear(readings(observed), columns, ("a", "b"), effects=effects)
+    variances = Variances(NOISE)
+    base = fit(test, (), {"a": 1.0, "b": 1.0}, test.readings.fit, variances)
+    alike = test.predict((), base.values)
+    combos = [((v, s),) for v in forms for s in signatures(test, base, *alike, v)]
+    found = fit_combinations(test, base, combos, variances, most=1, starts=1)
+    size = {f.variants[-1].label: f.sum_of_squares for f in found}
+    assert len(size) == starts.OF_A_KIND
+    assert size["short"] == max(size.values()), "the others leave less"
+
+
 def test_of_many_starts_the_most_promising_are_fitted_and_the_best_to_the_end(monkeypatch):
     t = np.linspace(0.0, 1.0, 40)
     scales = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0]

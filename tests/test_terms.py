@@ -99,6 +99,34 @@ def test_memories_fade():
     assert marched(work, out)[1] == pytest.approx(expected[1:])
 
 
+def test_what_shear_breaks_is_built_again():
+    """At an even rate as e^(−(|γ̇|/d + 1/τ) t) to the balance of both, at rest as e^(−t/τ)."""
+    rate, memory, wear = 0.2, 2.0, 0.1
+    law = ShapedLaw("odd", "broken", 1.0, (1.0,), memory=memory, wear=wear)
+    t = STEP * np.arange(1, 9)
+    turns = rate / wear + 1.0 / memory
+    balance = rate / wear / turns
+    moving = balance * (1.0 - np.exp(-turns * t))
+    held = moving[-1] * np.exp(-t / memory)
+    gammas = np.append(rate * t, [rate * t[-1]] * 8)
+    assert marched(law, gammas)[1] == pytest.approx([*moving, *held])
+    # To both sides alike.
+    assert marched(law, -gammas)[1] == pytest.approx([*moving, *held])
+
+
+def test_what_a_hold_builds_is_felt_when_it_ends():
+    """1 − e^(−t/τ), spent with the path as e^(−path/d): a friction does not grow in a hold."""
+    law = ShapedLaw("dissipative", "healed", 1.0, (1.0,), stick_angle=1e-3, memory=2.0, wear=0.1)
+    path = [0.1, 0.1, 0.1, 0.1, 0.15, 0.2, 0.2, 0.1]
+    first = 1.0 - np.exp(-3.0 * STEP / 2.0)
+    moved = [first * np.exp(-0.5), first * np.exp(-1.0)]
+    last = (1.0 - (1.0 - moved[1]) * np.exp(-STEP / 2.0)) * np.exp(-1.0)
+    expected = [0.0, 0.0, 0.0, 0.0, *moved, moved[1], -last]
+    moments, felt = marched(law, path)
+    assert felt == pytest.approx(np.abs(expected))
+    assert moments == pytest.approx(expected)
+
+
 @pytest.mark.parametrize(
     ("kind", "coefficients", "numbers"),
     [
@@ -151,6 +179,8 @@ def test_bases():
         "viscous": change / STEP,
         "odd": np.sign(gamma),
         "even": np.ones(6),
+        "above": [1.0, 1.0, 1.0, 1.0, 0.0, 1.0],
+        "below": [0.0, 0.0, 0.0, 0.0, -1.0, 0.0],
         "odd_in_rate": [1.0, 1.0, 1.0, -1.0, -1.0, 1.0],
         "dissipative": [0.5, 1.0, 1.0, 0.5, -1.0, 1.0],
     }

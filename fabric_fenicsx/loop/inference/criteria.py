@@ -82,6 +82,7 @@ class Criteria:
         cancelling: readings, all together, that a single part of an effect may be as large as; more
             only where it cancels with others; convention.
         pairs: of rivals, for which a further test is looked for; convention.
+        again: times that models are compared at most, as what was chosen turns out; convention.
         rounds: times that readings are left out, from ever better models; made-up.
         said_correlation: of neighbouring readings, above which the report names it; convention.
         said_quantum: step of the readings over noise, above which it does; convention.
@@ -144,6 +145,7 @@ class Criteria:
     without_formula: float = 3.0
     cancelling: float = 1e3
     pairs: int = 4
+    again: int = 3
     rounds: int = 2
     said_correlation: float = 0.15
     said_quantum: float = 0.5

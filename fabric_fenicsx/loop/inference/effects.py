@@ -67,11 +67,14 @@ class Variant:
         label: what tells it from the others of its effect.
         parameters: its numbers, amplitudes first.
         shape: of a term without a formula; None of what has one.
+        factor_of: of a term that is a factor, a variable that it is a factor of; empty where that
+            is none that terms depend on.
     """
 
     label: str
     parameters: tuple[Parameter, ...]
     shape: Shape | None = field(default=None, kw_only=True)
+    factor_of: str = field(default="", kw_only=True)
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:

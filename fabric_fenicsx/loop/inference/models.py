@@ -17,7 +17,7 @@ from .noise import Noise, estimated_noise
 from .starts import SMALL, Combination, around_jumps, fit_combinations
 from .variances import Variances
 
-__all__ = ["REFINED_WITHIN", "Models", "nearest_forms", "nothing_left"]
+__all__ = ["REFINED_WITHIN", "Models", "nearest_forms", "nothing_left", "simplest_first"]
 
 #: Scatter of specimens, as a share, that first fits allow for.
 FIRST_SCATTER = 0.1
@@ -260,7 +260,7 @@ class Models:
             same = [m for m in rest if m.fit.variants == model.fit.variants]
             rest = [m for m in rest if m not in same or m.criterion < model.criterion - 1.0]
             refined.append(model)
-        return _simplest_first(sorted(refined, key=lambda m: m.criterion)) + rest
+        return simplest_first(refined) + rest
 
     def ranked(self, found: Sequence[Fit]) -> list[Model]:
         """Fits as models with their own noise and scatter, the best first; see weighed.
@@ -381,16 +381,17 @@ class Models:
             return model.effects
 
 
-def _simplest_first(models: list[Model]) -> list[Model]:
+def simplest_first(models: Sequence[Model]) -> list[Model]:
     """The best first, or one that is as good, goes by fewer variables or has fewer parameters.
 
     As many effects are in each. One with a name, and its formula, goes by none.
     """
-    if not models:
-        return models
-    alike = [m for m in models if m.criterion < models[0].criterion + AS_GOOD]
+    ranked = sorted(models, key=lambda m: m.criterion)
+    if not ranked:
+        return ranked
+    alike = [m for m in ranked if m.criterion < ranked[0].criterion + AS_GOOD]
     first = min(alike, key=_complexity)
-    return [first, *(m for m in models if m is not first)]
+    return [first, *(m for m in ranked if m is not first)]
 
 
 def _complexity(model: Model) -> tuple[int, int]:

@@ -19,15 +19,15 @@ from .beside import by_itself, forms_beside, signed
 from .choice import chosen_model, in_place_of, models_instead, verdict_on
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
-from .diagnosis import Candidate, Diagnosis
+from .diagnosis import Candidate, Diagnosis, Verdict
 from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitting import Fit, fit
 from .judge import Model
-from .models import Models, nothing_left
+from .models import Models, nothing_left, simplest_first
 from .noise import quantum
 from .notes import errors_beside, noise_source, notes_of
-from .rivals import pairs_of, rivals_of
+from .rivals import InPlace, in_place, pairs_of, rivals_of
 from .screen import Screen, Signatures
 from .starts import Combination, ToFirstOrder
 from .variances import Variances
@@ -70,8 +70,6 @@ class Search:
         self._one_more: dict[Model, bool] = {}
         #: What was found so far.
         self.found: Diagnosis | None = None
-        #: Effects that every other one was tried beside.
-        self._tried: set[frozenset[Effect]] = set()
         #: Effects that were tried in all their forms, and the forms beside which they were.
         self._in_all_forms: set[tuple[Effect, frozenset[Variant]]] = set()
         self._kept_screen: Kept[Screen] = Kept(1)
@@ -90,28 +88,20 @@ class Search:
             levels = self._with_other_readings(candidates, levels)
         baseline = levels[0][0]
         self.singles = levels[1] if len(levels) > 1 else ()
-        chosen = chosen_model(
-            self.judge, levels, terms=self._screened_first, may_be_one_more=self.may_be_one_more
-        )
-        verdict = verdict_on(self.judge, baseline, chosen)
+        chosen, verdict, final, in_their_place = self._chosen_of(levels)
         self.accounted = self.judge.accounts(chosen, baseline)
         self.doubtful_noise = self.judge.doubtful_noise(chosen)
         self.specimens_differ = bool(chosen.fit.deviations)
         self.may_be_more = self.may_be_one_more(chosen)
         nearest = _nearest(levels)
-        final = chosen if verdict in ("effect_found", "effect_discovered") else baseline
-        if final.effects:
-            final = self.models.last(final)
         # Held-out runs, by which it may be contradicted, do not say whether to look further.
         self.chosen = final if final.effects else chosen
-        self.progress(0.9, "rivals")
         judged = final if verdict != "unexplained" else nearest
         misfit = self.judge.misfit(judged)
         curve = self._curve(judged) if verdict == "unexplained" else None
         of_the_curve = self._of_the_curve(levels) if curve is not None else ()
         instead = models_instead(self.judge, levels, chosen) if verdict == "unexplained" else {}
-        most = CRITERIA.terms if self._screened_first else len(self.effects)
-        rivals = rivals_of(self.models, self._screened, final, levels, most, self._tried)
+        rivals = rivals_of(self.models, final, in_their_place)
         for candidate in candidates:
             if candidate.fit is not None:
                 # Those far behind have not got their own noise and scatter yet.
@@ -153,6 +143,37 @@ class Search:
             notes=[*self.experiment.notes, *notes_of(self.judge, final.fit, baseline.fit)],
         )
         return self.found
+
+    def _chosen_of(self, levels: list[list[Model]]) -> tuple[Model, Verdict, Model, InPlace]:
+        """The chosen model, the verdict, what is reported, and what may stand in its place.
+
+        A fit that was not at its end when models were compared may lose there, and what is tried
+        only as a rival may win: then they are compared again.
+        """
+        most = CRITERIA.terms if self._screened_first else len(self.effects)
+        for _ in range(CRITERIA.again):
+            chosen = chosen_model(
+                self.judge, levels, terms=self._screened_first, may_be_one_more=self.may_be_one_more
+            )
+            verdict = verdict_on(self.judge, levels[0][0], chosen)
+            if verdict not in ("effect_found", "effect_discovered"):
+                return chosen, verdict, levels[0][0], {}
+            level = levels[len(chosen.effects)]
+            final = self.models.last(chosen)
+            self.progress(0.9, "rivals")
+            others = in_place(self.models, self._screened, final, levels, most)
+            ahead = [m for of in others.values() for each in of.values() for m in each]
+            ahead = [
+                m
+                for m in ahead
+                if m not in level and m.criterion < final.criterion - CRITERIA.decisive
+            ]
+            if final.criterion > chosen.criterion + CRITERIA.decisive:
+                level[level.index(chosen)] = final
+            elif not ahead:
+                break
+            level[:] = self.models.best_refined([*level, *ahead])
+        return chosen, verdict, final, others
 
     def _with_other_readings(
         self, candidates: list[Candidate], levels: Sequence[Sequence[Model]]
@@ -274,11 +295,11 @@ class Search:
         if self._screened_first and not self._settled(_nearest(levels), levels[0][0]):
             ranked = screen.most_promising(len(tried) + CRITERIA.glimpsed)
             later = self._after_a_glimpse(screen, self._signatures, ranked[len(tried) :])
-            levels[1] = sorted([*levels[1], *later], key=lambda m: m.criterion)
+            levels[1] = simplest_first([*levels[1], *later])
         best = _nearest(levels)
         if self._of_two and (not self._settled(best, levels[0][0]) or self.judge.uneven(best.fit)):
             of_two = self._over_two_variables(candidates)
-            levels[1] = sorted([*levels[1], *of_two], key=lambda m: m.criterion)
+            levels[1] = simplest_first([*levels[1], *of_two])
         for candidate in candidates:
             candidate.fit = _best_of(candidate.effect, levels)
         return candidates, levels
@@ -440,7 +461,6 @@ class Search:
                 found += self.models.fitted(more, starts=1, base=base, most=CRITERIA.terms)
             levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
             self._with_one_less(levels)
-        self._tried |= {frozenset(map(self.models.effect_of, kept)) for kept in tried}
 
     def _in_other_forms(self, levels: list[list[Model]]) -> None:
         """The best model of the last level with each of its effects in each of its forms.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from .criteria import CRITERIA
 from .diagnosis import Pair
@@ -11,40 +11,57 @@ from .judge import Model
 from .models import REFINED_WITHIN, Models, nearest_forms
 from .screen import Screen
 
-__all__ = ["near", "pairs_of", "rivals_of"]
+__all__ = ["InPlace", "in_place", "near", "pairs_of", "rivals_of"]
 
 
-def rivals_of(
+InPlace = Mapping[Effect, Mapping[Effect, Sequence[Model]]]
+"""For each effect of a model, models in which another one takes its place."""
+
+
+def in_place(
     models: Models,
     screened: Callable[[], Screen],
     final: Model,
     levels: Sequence[Sequence[Model]],
     most: int,
-    tried: Collection[frozenset[Effect]],
-) -> dict[str, list[str]]:
-    """For each effect of a model, the others that could take its place in it.
+) -> InPlace:
+    """What other effects do in the place of each effect of a model.
 
     Args:
         models: of the test.
         screened: all effects to first order.
         final: the model.
         levels: models that are known, by their number of effects.
-        most: effects that are tried beside others of the model, the most promising.
-        tried: effects that every other one was tried beside already.
+        most: effects that are tried beside others of the model, the most promising of those that
+            were not.
     """
-    found: dict[str, list[str]] = {}
+    found: dict[Effect, dict[Effect, list[Model]]] = {}
     others = [e for e in models.effects if e not in final.effects]
     for own in final.effects:
         kept = [e for e in final.effects if e is not own]
         level = levels[len(final.effects)]
         known = {other: [m for m in level if set(m.effects) == {other, *kept}] for other in others}
-        if kept and frozenset(kept) not in tried:
+        if kept:
             forms = [v for v in final.fit.variants if models.effect_of(v) is not own]
             combinations = screened().instead(forms, [e for e in others if not known[e]], most)
             for model in models.weighed(models.fitted(combinations, starts=1)):
                 if model.criterion < final.criterion + REFINED_WITHIN:
                     (other,) = set(model.effects) - set(kept)
                     known[other].append(models.refined(model))
+        found[own] = known
+    return found
+
+
+def rivals_of(models: Models, final: Model, others: InPlace) -> dict[str, list[str]]:
+    """For each effect of a model, the others that could take its place in it.
+
+    Args:
+        models: of the test.
+        final: the model.
+        others: models in which they do.
+    """
+    found: dict[str, list[str]] = {}
+    for own, known in others.items():
         found[own.name] = []
         for other, mine in known.items():
             best = min(mine, key=lambda m: m.criterion, default=None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,7 +92,8 @@ def fit_combinations(
     for forms, own in by_forms.items():
         own.sort(key=lambda start: start.left)
         promising += [(forms, start) for start in own[:starts]]
-    promising.sort(key=lambda one: one[1].left)
+    count = int(base.used.sum())
+    promising.sort(key=lambda one: one[1].left + _cost(one[0], count))
     if most is not None:
         promising = _of_so_many_kinds(promising, kinds, most)
     wanted = _worth_a_look(promising)[: CRITERIA.looks]
@@ -131,6 +132,11 @@ def fit_combinations(
     return fits
 
 
+def _cost(forms: Iterable[Variant], count: int) -> float:
+    """Of the parameters of some forms, fitted to so many readings (BIC)."""
+    return float(np.log(count)) * sum(len(v.parameters) for v in forms)
+
+
 def _worth_a_look(
     promising: Sequence[tuple[tuple[Variant, ...], _Start]],
 ) -> list[tuple[tuple[Variant, ...], _Start]]:
@@ -140,9 +146,10 @@ def _worth_a_look(
     """
     followed: set[tuple[Variant, ...]] = set()
     kept = []
+    least = min((start.left for _, start in promising), default=0.0)
     for forms, start in promising:
         limit = CRITERIA.second_start if forms in followed else CRITERIA.far_off
-        if start.left <= limit * promising[0][1].left:
+        if start.left <= limit * least:
             followed.add(forms)
             kept.append((forms, start))
     return kept
@@ -262,10 +269,12 @@ class ToFirstOrder:
             # What begins with much of an effect, or is never absent, is not judged by a little.
             little = all(v.amplitudes and one.little(v) for v, one in combination)
             (judged if little else chosen).append(combination)
-        lefts = self._unbounded(judged)
+        count = int(self._base.used.sum())
+        costs = np.array([_cost((v for v, _ in one), count) for one in judged])
+        worths = self._unbounded(judged) + costs
         # Places are shared by forms or, where not all kinds are wanted, by these.
         taken: Counter[Hashable] = Counter()
-        for one in (judged[k] for k in np.argsort(lefts, kind="stable")):
+        for one in (judged[k] for k in np.argsort(worths, kind="stable")):
             own = tuple(v for v, _ in one) if most is None else kind(one)
             if most is not None and own not in taken and len(taken) == SPARE * most:
                 continue

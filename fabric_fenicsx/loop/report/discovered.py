@@ -297,10 +297,16 @@ def discovered_report(d: Diagnosis, terms: Sequence[Discovered]) -> list[dict[st
             return {"name": name}
         return {"acts_on": other.acts_on, "depends_on": list(other.depends_on)}
 
-    def rivals(effect: Effect) -> list[dict[str, Any]]:
+    def rivals(term: Discovered) -> list[dict[str, Any]]:
+        effect, factor_of = term.effect, term.variant.factor_of
         own = effect.in_general
-        others = [rival(name) for name in d.rivals.get(effect.name, []) if name != own]
-        return [{"name": own, "in_general": True}] * bool(own) + others
+        found = [rival(name) for name in d.rivals.get(effect.name, []) if name != own]
+        whatever: list[dict[str, Any]] = [{"name": own}] if own else []
+        if factor_of:
+            both = [factor_of, *effect.depends_on]
+            found = [r for r in found if set(r.get("depends_on", ())) != set(both)]
+            whatever.append({"acts_on": effect.acts_on, "depends_on": both})
+        return [{**one, "in_general": True} for one in whatever] + found
 
     errors = d.final.errors
     reported = []
@@ -316,7 +322,7 @@ def discovered_report(d: Diagnosis, terms: Sequence[Discovered]) -> list[dict[st
                 "shape": f"{term.name}.csv",
                 "formula": term.formula,
                 "file": f"{term.name}.py",
-                "rivals": rivals(term.effect),
+                "rivals": rivals(term),
                 "variant": term.variant.label,
                 "meaning": term.effect.meaning,
                 "of": term.effect.name,

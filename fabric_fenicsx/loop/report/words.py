@@ -156,14 +156,20 @@ def _discovered(report: Mapping[str, Any], before: str, after: str, scatter: str
 
 def _not_told(term: Mapping[str, Any]) -> str:
     """What readings cannot tell a term from, in a sentence."""
-    in_general = [r["name"] for r in term["rivals"] if r.get("in_general")]
+    whatever = [r for r in term["rivals"] if r.get("in_general")]
+    in_general = [r["name"] for r in whatever if "name" in r]
     listed = [r["name"] for r in term["rivals"] if "name" in r and r["name"] not in in_general]
-    others = [r for r in term["rivals"] if "name" not in r]
+    others = [r for r in term["rivals"] if "name" not in r and r not in whatever]
     if not term["one_curve"]:
         words = [*listed, *(f"the {_acts_on(r)} by {_variables(r)}" for r in others)]
         words = list(dict.fromkeys(words))
         text = f" This data cannot tell {term['name']} from {one_of(words)}." if words else ""
         is_one = "".join(f" It is {name} in a form that is on no list." for name in in_general)
+        is_one += "".join(
+            f" As a factor of the {r['depends_on'][0]} it is a {_acts_on(r)} by {_variables(r)}."
+            for r in whatever
+            if "name" not in r
+        )
         return is_one + text
     # Laws of all kinds: a long list would only hide that nothing is known of it.
     of = [*term["depends_on"], *(name for r in others for name in r["depends_on"])]

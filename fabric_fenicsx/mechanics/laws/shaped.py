@@ -29,6 +29,8 @@ Variable = Literal[
     "recent_square_of_angle",
     "recent_square_of_rate",
     "recent_work",
+    "broken",
+    "healed",
 ]
 Also = Literal["angle", "rate", "largest_angle", "path", "time"]
 Kind = Literal[
@@ -56,6 +58,8 @@ Base = Literal[
     "smooth",
     "odd",
     "even",
+    "above",
+    "below",
     "odd_in_rate",
     "even_in_rate",
     "outward",
@@ -105,29 +109,60 @@ def _unloading(at: Crossing, past: Any) -> Any:
     return conditional(gt(more, 0), 0.0, conditional(lt(more, 0), 1.0, past))
 
 
-VARIABLES: dict[str, Callable[[Crossing, Any, Any], Any]] = {
-    "angle": lambda at, past, memory: at.size,
-    "rate": lambda at, past, memory: size_of(at.rate),
-    "largest_angle": lambda at, past, memory: max_value(past, at.size),
-    "relative_angle": lambda at, past, memory: _relative(at, max_value(past, at.size)),
-    "path": lambda at, past, memory: past + size_of(at.change),
-    "since_reversal": lambda at, past, memory: size_of(_way(at, past)),
-    "time": lambda at, past, memory: past + 1 / at.per_time,
-    "unloading": lambda at, past, memory: _unloading(at, past),
-    "recent_angle": lambda at, past, memory: recent(at.size, past, at.per_time, memory),
-    "recent_largest_angle": lambda at, past, memory: max_value(
+def broken(at: Crossing, past: Any, memory: Any, wear: Any) -> Any:
+    """Share b of a structure that shear has broken: db/dt = (1 − b) |γ̇|/d − b/τ, whole at first.
+
+    As of thixotropy (F. Moore, Trans. Brit. Ceram. Soc. 58, 1959); exact at an even rate.
+
+    Args:
+        at: the crossing.
+        past: b before the step.
+        memory: τ [s].
+        wear: d [rad].
+    """
+    breaks, heals = size_of(at.rate) / wear, 1 / memory
+    end = breaks / (breaks + heals)
+    return end + (past - end) * exp(-(breaks + heals) / at.per_time)
+
+
+def healed(at: Crossing, past: Any, memory: Any, wear: Any) -> Any:
+    """Share h of a structure that holds have built: dh/dt = (1 − h)/τ in one, else −h |γ̇|/d.
+
+    None of it is there at first; as a friction that has to break away after each rest.
+    """
+    spent = past * exp(-size_of(at.change) / wear)
+    return conditional(eq(at.change, 0), 1 - (1 - past) * kept(at.per_time, memory), spent)
+
+
+VARIABLES: dict[str, Callable[[Crossing, Any, Any, Any], Any]] = {
+    "angle": lambda at, past, memory, wear: at.size,
+    "rate": lambda at, past, memory, wear: size_of(at.rate),
+    "largest_angle": lambda at, past, memory, wear: max_value(past, at.size),
+    "relative_angle": lambda at, past, memory, wear: _relative(at, max_value(past, at.size)),
+    "path": lambda at, past, memory, wear: past + size_of(at.change),
+    "since_reversal": lambda at, past, memory, wear: size_of(_way(at, past)),
+    "time": lambda at, past, memory, wear: past + 1 / at.per_time,
+    "unloading": lambda at, past, memory, wear: _unloading(at, past),
+    "recent_angle": lambda at, past, memory, wear: recent(at.size, past, at.per_time, memory),
+    "recent_largest_angle": lambda at, past, memory, wear: max_value(
         past * kept(at.per_time, memory), at.size
     ),
-    "recent_rate": lambda at, past, memory: recent(size_of(at.rate), past, at.per_time, memory),
-    "recent_square_of_angle": lambda at, past, memory: recent(
+    "recent_rate": lambda at, past, memory, wear: recent(
+        size_of(at.rate), past, at.per_time, memory
+    ),
+    "recent_square_of_angle": lambda at, past, memory, wear: recent(
         at.gamma**2, past, at.per_time, memory
     ),
-    "recent_square_of_rate": lambda at, past, memory: recent(at.rate**2, past, at.per_time, memory),
-    "recent_work": lambda at, past, memory: recent(
+    "recent_square_of_rate": lambda at, past, memory, wear: recent(
+        at.rate**2, past, at.per_time, memory
+    ),
+    "recent_work": lambda at, past, memory, wear: recent(
         size_of(at.gamma * at.rate), past, at.per_time, memory
     ),
+    "broken": broken,
+    "healed": healed,
 }
-"""What a factor may depend on, from the crossing, its value at the step before, and τ [s].
+"""What a factor may depend on, from the crossing, its value at the step before, τ [s] and d [rad].
 
 Angles in rad, |γ| over its largest value so far, the path Σ|Δγ| of all and since the last turn, the
 time since the beginning [s];
@@ -332,10 +367,11 @@ class ShapedLaw(CrossingLaw):
             of limit 1 with a stick, "smooth" Dahl's of limit 1, "flowing" a stick that gives way
             the faster the more it is bent, ds/dt = (γ̇ − r s |s|^(n−1))/δ (F. H. Norton, The Creep
             of Steel at High Temperatures, 1929), 1 where γ̇ is r for long, "odd" sign γ, "even" 1,
-            "odd_in_rate" sign γ̇, "even_in_rate" 1, "outward" sign γ while |γ| grows, "forward" 1
-            while γ grows. Of "rest" it is no factor but an angle, to which the spring has moved its
-            state of rest: with e the elastic moment and s the sign of γ where it was largest so
-            far, M = e(γ − s (c₀ + f)) − e(γ), as of a permanent set.
+            "above" 1 where γ > 0, "below" −1 where γ < 0, "odd_in_rate" sign γ̇, "even_in_rate" 1,
+            "outward" sign γ while |γ| grows, "forward" 1 while γ grows. Of "rest" it is no factor
+            but an angle, to which the spring has moved its state of rest: with e the elastic moment
+            and s the sign of γ where it was largest so far, M = e(γ − s (c₀ + f)) − e(γ), as of a
+            permanent set.
         variable: v, see VARIABLES.
         reach: v_max [rad, rad/s or s].
         coefficients: of f: [-] of the elastic base, [rad] of an angle of rest, [N mm s] of the
@@ -347,6 +383,7 @@ class ShapedLaw(CrossingLaw):
         stick_angle: δ, of a friction [rad].
         exponent, flow_rate: n > 1 and r [rad/s], of one that flows.
         memory: τ of a variable that forgets [s].
+        wear: d, the shear in which what rests build is broken [rad].
         also: w, another variable that f depends on, if it does.
         also_reach: w_max [rad, rad/s or s].
         powers: p; ``coefficients`` has those of f_p for each in turn.
@@ -374,6 +411,7 @@ class ShapedLaw(CrossingLaw):
     exponent: Any = number("exponent", "of a flow", default=5.0)
     flow_rate: Any = number("flow_rate_rad_s", "at which a flow is at its limit", default=0.01)
     memory: Any = number("memory_s", "of a variable that forgets", default=1.0)
+    wear: Any = in_degrees("wear_angle_deg", "in which what rest builds is broken", default=5.0)
     also: Also | None = number("also", "another variable of the factor", Also | None, None)
     also_reach: Any = number("also_reach", "its largest value that was seen", default=1.0)
     powers: Any = number("powers", "of it, each with coefficients", list[NotNegative], [])
@@ -417,21 +455,28 @@ class ShapedLaw(CrossingLaw):
 
     def variable_at(self, at: Crossing) -> Any:
         """V at the end of the step."""
+        value = self._value_at(at)
+        if self.variable == "healed":
+            # What a hold builds is felt when it ends.
+            return conditional(eq(at.change, 0), at.past("felt"), value)
+        return value
+
+    def _value_at(self, at: Crossing) -> Any:
         past = None if self.variable in AT_HAND else at.past("variable")
-        return VARIABLES[self.variable](at, past, at.number(self.memory))
+        return VARIABLES[self.variable](at, past, at.number(self.memory), at.number(self.wear))
 
     def _also_at(self, at: Crossing) -> Any:
         """W at the end of the step."""
         assert self.also is not None
         past = None if self.also in AT_HAND else at.past("also")
-        return VARIABLES[self.also](at, past, None)
+        return VARIABLES[self.also](at, past, None, None)
 
     def _remembered(self, at: Crossing) -> Any:
         if self.variable == "relative_angle":
             return max_value(at.past("variable"), at.size)
         if self.variable == "since_reversal":
             return _way(at, at.past("variable"))
-        return self.variable_at(at)
+        return self._value_at(at)
 
     def factor(self, at: Crossing) -> Any:
         """c₀ + f at the end of the step."""
@@ -472,6 +517,8 @@ class ShapedLaw(CrossingLaw):
         its sign.
         """
         history = {} if self.variable in AT_HAND else {"variable": self._remembered(at)}
+        if self.variable == "healed":
+            history["felt"] = self.variable_at(at)
         if self.also is not None and self.also not in AT_HAND:
             history["also"] = self._also_at(at)
         if self.base == "rest":
@@ -507,6 +554,10 @@ class ShapedLaw(CrossingLaw):
             return flowed(flowed(at.past("stick"), half, n) + at.change / stick, half, n)
         if self.base == "odd":
             return signed(at.gamma, 1.0)
+        if self.base == "above":
+            return conditional(gt(at.gamma, 0), 1.0, 0.0)
+        if self.base == "below":
+            return conditional(lt(at.gamma, 0), -1.0, 0.0)
         if self.base == "odd_in_rate":
             return signed(at.rate, 1.0)
         if self.base == "outward":

@@ -16,6 +16,7 @@ from ...inference.effects import Values, valued
 from ..records import FEWEST_BY_TURNS, SHARP, between_runs
 
 __all__ = [
+    "DECAYS",
     "HEAVIEST",
     "LARGEST",
     "SHARPEST",
@@ -28,6 +29,7 @@ __all__ = [
     "over_overhangs",
     "over_runs",
     "places",
+    "saturation",
     "splines",
     "two_places",
     "wave",
@@ -37,6 +39,8 @@ __all__ = [
 SPLINES = (1, 2)
 #: Where a step, or a bump, may begin to be looked for, as a share of the longest strip.
 STEPS, BUMPS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
+#: Likewise of what is counted from its free end.
+NEAR_END = (0.08, 0.2)
 #: How wide they are.
 WIDTH, BUMP_WIDTHS = 0.03, (0.03, 0.1)
 #: How far apart two such are.
@@ -84,10 +88,14 @@ def along_the_strip(
     decay = Parameter(f"{name}_width", DECAYS, 0.02, 1.0)
     much = replace(one, lower=-LARGEST, upper=most) if end != "clamp" else one
     yield "decay", (much, decay), lambda p, x: p[one.name] * exp(-x / p[decay.name])
-    if end != "clamp":
-        # Nothing much bends there: a place of its own would hardly be known.
+    if end == "clamp":
+        yield from places(name)
         return
-    yield from places(name)
+    # Nothing much bends there, but what lies there is a weight.
+    for label, own, place in places(name):
+        if label != "corner":
+            near = (replace(p, starts=NEAR_END) if p.starts in (STEPS, BUMPS) else p for p in own)
+            yield label, tuple(near), place
 
 
 def over_overhangs(name: str, count: float, *, constant: bool = False) -> Iterator[Drawn]:
@@ -146,6 +154,19 @@ def wave(name: str, overtones: int = 0, *, constant: bool = True) -> Drawn:
     return label, (*zero, *own, period), around
 
 
+def saturation(
+    name: str, starts: tuple[float, ...], quickest: float, *, constant: bool = False
+) -> Drawn:
+    """What soon grows no more, within no less than that share of the range."""
+    zero = (coefficient(f"{name}_0"),) if constant else ()
+    one, width = coefficient(f"{name}_1"), Parameter(f"{name}_width", starts, quickest, 2.0)
+
+    def saturating(p: Values, x: Any) -> Any:
+        return sum(p[c.name] for c in zero) + p[one.name] * (1 - exp(-abs(x) / p[width.name]))
+
+    return "saturation", (*zero, one, width), saturating
+
+
 def two_places(name: str) -> Drawn:
     """What is at two places alike."""
     one = coefficient(f"{name}_1")
@@ -172,12 +193,8 @@ def over_runs(name: str, last: float, *, constant: bool = False) -> Iterator[Dra
     """Shapes over the few runs that there are, so many of them before the last one."""
     yield from splines(name, SPLINES, constant=constant)
     zero = (coefficient(f"{name}_0"),) if constant else ()
-    one, width = coefficient(f"{name}_1"), Parameter(f"{name}_width", FADING, 0.1, 2.0)
-
-    def saturating(p: Values, x: Any) -> Any:
-        return sum(p[c.name] for c in zero) + p[one.name] * (1 - exp(-x / p[width.name]))
-
-    yield "saturation", (*zero, one, width), saturating
+    one = coefficient(f"{name}_1")
+    yield saturation(name, FADING, 0.1, constant=constant)
     yield from by_turns(name, last, constant=constant)
     if last < FEWEST_BY_TURNS:
         return

@@ -31,6 +31,7 @@ from ..records import FEWEST_BEFORE
 from .own_terms import own_terms
 from .products import products
 from .shapes import (
+    DECAYS,
     HEAVIEST,
     LARGEST,
     SHARPEST,
@@ -42,6 +43,7 @@ from .shapes import (
     over_overhangs,
     over_runs,
     places,
+    saturation,
     splines,
     two_places,
     wave,
@@ -292,13 +294,17 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         # In a table they stand beside each other.
         y = "share_of_height" if unit is None else "added_height_mm" if by == "z" else X["z"]
         shape = Shape(X[by], y, most, partial(times, unit or 1.0, of))
-        return StripVariant(f"{to}, {label}", parameters, shape=shape, camera=camera)
+        of_height = "height" if to == "scale" and by != "z" else ""
+        return StripVariant(
+            f"{to}, {label}", parameters, shape=shape, factor_of=of_height, camera=camera
+        )
 
     name = "reading_of_height"
     even = coefficient(f"{name}_0")
     forms = [form("even", (even,), lambda p, x: p[even.name], "z", "scale")]
     forms += [form(*shape, "z", "scale") for shape in splines(name, SPLINES)]
     forms.append(form(*wave(name), "z", "height"))
+    forms.append(form(*saturation(name, DECAYS, 0.02), "z", "height"))
     forms += [form(*shape, "z", "height") for shape in places(name, SHARPEST)]
     yield strip_effect(name, "scale of heights", "reading", ("height",), forms)
 
@@ -311,6 +317,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     forms += [form(*shape, "x", "scale") for shape in splines(name, SPLINES)]
     forms += [form(*shape, "x", "height") for shape in splines(name, SPLINES[1:])]
     forms.append(form(*wave(name), "x", "height"))
+    forms.append(form(*saturation(name, DECAYS, 0.02), "x", "height"))
     forms += [form(*shape, "x", "height") for shape in places(name, SHARPEST)]
     about = "heights, or their scale, by the distance from the clamp"
     yield strip_effect(name, about, "reading", ("distance",), forms)

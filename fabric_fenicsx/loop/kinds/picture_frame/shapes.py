@@ -17,6 +17,7 @@ __all__ = [
     "FINE",
     "FORGETFUL",
     "SQUARES",
+    "STRUCTURE",
     "Drawn",
     "Ends",
     "X",
@@ -98,6 +99,9 @@ SQUARES = ("recent_square_of_angle", "recent_square_of_rate", "recent_work")
 FORGETFUL = ("recent_angle", "recent_largest_angle", "recent_rate", *SQUARES)
 """Variables of a fading memory."""
 
+STRUCTURE = ("broken", "healed")
+"""Shares of what shear breaks or spends and rest builds."""
+
 CARRIED = {"largest_angle": "largest_angle", "relative_angle": "largest_angle", "path": "path"}
 """What variables have from earlier runs of a specimen; see FrameVariant.carried."""
 
@@ -123,6 +127,8 @@ X = {
     "recent_square_of_angle": "recent_square_of_angle_rad2",
     "recent_square_of_rate": "recent_square_of_rate_rad2_s2",
     "recent_work": "recent_work_rad2_s",
+    "broken": "broken_share",
+    "healed": "healed_share",
     "unloading": "unloading",
     "time": "time_s",
     "displacement": "displacement_mm",
@@ -217,6 +223,8 @@ def wealth(base: str, variable: str) -> int:
     """How many of the splines, which are the more the less else there is to be found."""
     if variable == "unloading":
         return 1
+    if variable in STRUCTURE:
+        return 2
     if variable in SQUARES:
         # Small ones and large ones are far apart.
         return 4

@@ -21,6 +21,7 @@ from .rig_terms import rig_terms
 from .shapes import (
     FINE,
     FORGETFUL,
+    STRUCTURE,
     Drawn,
     Ends,
     X,
@@ -41,8 +42,12 @@ from .variant import FrameVariant
 
 __all__ = ["as_reported", "of_a_law", "ranges_of", "remembering", "terms"]
 
+#: As far to either side, as a share of the largest displacement, one of them may have its own.
+SIDE = 0.2
 #: Angles in which a friction begins to slide [rad].
 STICKS = (0.005, 0.03)
+#: Shears in which what rests build is broken, as shares of the largest angle.
+WEARS = (0.03, 0.15, 0.6)
 #: Plays of what follows the angle, as shares of the largest one.
 PLAYS = (0.02, 0.1, 0.3)
 #: By how much longer a memory may get in a time, as a share of that.
@@ -91,6 +96,7 @@ def terms(
     largest = ranges_of(ranges)
     return [
         *_of_the_crossing(largest),
+        *_on_one_side(largest, ends.get("displacement", (0.0, 1.0))),
         *_flowing(largest),
         *_lagging(largest),
         *rig_terms(largest, ends, specimens),
@@ -104,7 +110,8 @@ def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
     largest |= {"displacement_lag": ranges["displacement"]}
     largest |= {"mean_speed": ranges["speed"]}
     largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
-    largest |= {"relative_angle": 1.0, "since_reversal": ranges["angle"]}
+    largest |= {"relative_angle": 1.0, "since_reversal": ranges["angle"], "broken": 1.0}
+    largest["healed"] = 1.0
     largest |= {f"recent_square_of_{name}": ranges[name] ** 2 for name in ("angle", "rate")}
     largest["recent_work"] = ranges["angle"] * ranges["rate"]
     if ranges.get("run_of_folder", 0.0) >= FEWEST_BEFORE:
@@ -122,9 +129,10 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             "rate",
             "unloading",
             *FORGETFUL,
+            *STRUCTURE,
         ),
         "rest": ("largest_angle", "path", "time"),
-        "viscous": ("angle", "largest_angle", "path", "time", "unloading", *FORGETFUL),
+        "viscous": ("angle", "largest_angle", "path", "time", "unloading", *FORGETFUL, *STRUCTURE),
         "dissipative": (
             "angle",
             "largest_angle",
@@ -134,6 +142,7 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             "rate",
             "unloading",
             *FORGETFUL,
+            *STRUCTURE,
         ),
         "odd": ("angle",),
         "even": ("angle",),
@@ -160,6 +169,31 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
                 depends_on=depends_on,
                 in_general=IN_GENERAL.get(name, ""),
             )
+
+
+def _on_one_side(largest: Mapping[str, float], ends: tuple[float, float]) -> Iterator[Effect]:
+    """What only one way of shearing has, as a stitch that it draws tight; if there were both."""
+    if ends[0] > -SIDE or ends[1] < SIDE:
+        return
+    name = "one_sided_moment_of_angle"
+    # A line and a cube are the baseline's and an even moment's.
+    chosen = ("2 coefficients", "step", "saturation", "corner")
+    drawn = [one for one in shapes(name, 4) if one[0] in chosen] + [*bumps(name)]
+    fixed = {"variable": "angle", "reach": largest["angle"]}
+    forms = [
+        _law_form(f"{base} nothing, {label}", {**fixed, "base": base, **numbers, "coefficients": c})
+        for base in ("above", "below")
+        for label, c, numbers in drawn
+    ]
+    yield Effect(
+        name,
+        "picture_frame",
+        "moment of one way of shearing alone, by the angle",
+        tuple(forms),
+        of_fabric=False,
+        acts_on="moment",
+        depends_on=("angle",),
+    )
 
 
 def _flowing(largest: Mapping[str, float]) -> Iterator[Effect]:
@@ -257,6 +291,8 @@ ABOUT = {
 
 
 CALLED = {
+    "broken": "history",
+    "healed": "history",
     "unloading": "direction",
     "relative_angle": "largest_angle",
     "since_reversal": "history",
@@ -277,8 +313,11 @@ def remembering(
 ) -> dict[str, Parameter]:
     """What a memory of a variable, or a friction, has that is fitted beside its shape."""
     found = {}
-    if variable in FORGETFUL:
+    if variable in (*FORGETFUL, *STRUCTURE):
         found["memory"] = memory_of(name, largest)
+    if variable in STRUCTURE:
+        starts = tuple(share * largest["angle"] for share in WEARS)
+        found["wear"] = Parameter(f"{name}_wear_rad", starts, starts[0] / 30.0, 10.0 * starts[-1])
     if base in FRICTION:
         found["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-4, 0.3)
     return found
@@ -306,6 +345,9 @@ def _laws(
         drawn += [*pulses(name), *windows(name)]
     if (base, variable) in CYCLES:
         drawn += waves(name, CYCLES[base, variable], OVERTONES.get(variable, (0,)))
+    if variable in STRUCTURE:
+        # A share of a structure: what goes by it is near a line or bends once.
+        drawn = drawn[:2]
     for label, coefficients, numbers in drawn:
         first: FrameVariant | None = None
         for carried, reach, words in remembered_since(variable, largest):
