@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -124,7 +125,9 @@ def test_commands_of_a_page(place, page):
 @pytest.mark.slow
 @pytest.mark.parametrize("page", with_commands(slow=True))
 def test_all_commands_of_a_page(place, page):
+    # The quick ones have run there, if they were asked for.
     (place / "mine.yaml").unlink(missing_ok=True)
+    shutil.rmtree(place / "results" / "imported", ignore_errors=True)
     run_page(place, page, slow=True)
 
 

@@ -332,3 +332,30 @@ def test_a_term_that_is_a_listed_effect_says_so(kind, term, name):
     names = [rival["name"] for rival in said["rivals"]]
     assert sorted(names) == sorted({name or "nonlinear_bending", *diagnosis.rivals[term]})
     assert [r["name"] for r in said["rivals"] if r.get("in_general")] == [name] * bool(name)
+
+
+@pytest.mark.parametrize(
+    ("term", "label", "also"),
+    [
+        ("reading_of_distance", "scale, linear", ["height", "distance"]),
+        ("reading_of_distance", "turned", None),
+        ("reading_of_length", "scale, linear", ["height", "length"]),
+        ("reading_of_height", "scale, linear", None),
+    ],
+)
+def test_a_scale_of_heights_says_that_it_goes_by_the_height(term, label, also):
+    ranges = {"length": 250.0, "curvature": 0.01, "x": 200.0, "z": 100.0, "overhangs": 3.0}
+    every = strip_terms(ranges, ())
+    (effect,) = (e for e in every if e.name == term)
+    form = next(v for v in effect.variants if v.label == label)
+    diagnosis = SimpleNamespace(
+        experiment=SimpleNamespace(effects=CANTILEVER_EFFECTS, terms=every, alike=frozenset()),
+        final=SimpleNamespace(at_bound=(), errors={}),
+        # What is so in any case is not said twice.
+        rivals={term: ["reading_of_height_and_distance"]},
+    )
+    own = Discovered("discovered_1", effect, replace(form, parameters=()), {}, None, "")
+    (said,) = discovered_report(diagnosis, [own])
+    lens = {"acts_on": "reading", "depends_on": ["height", "distance"]}
+    general = [{"acts_on": "reading", "depends_on": also, "in_general": True}] if also else []
+    assert said["rivals"] == general + [lens] * (also != lens["depends_on"])

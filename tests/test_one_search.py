@@ -20,6 +20,7 @@ from fabric_fenicsx.loop.inference.search import _alike, diagnose_test
 from fabric_fenicsx.loop.inference.variances import Variances
 
 RUNS, EACH = 4, 150
+NOISE = Noise(0.02)
 
 
 def made(columns, expected, effects, cls=Linear, **more):
@@ -112,7 +113,7 @@ class OnlyAsSpecimensDiffer(Linear):
     """Has no solution for specimens that are alike where there is much of an effect."""
 
     def predict(self, variants, values, deviations=NO_DEVIATIONS):
-        if values.get("wave", 0.0) > 0.3 and not deviations:
+        if values.get("wave", 0.0) > 0.3 and not any(np.any(own) for own in deviations.values()):
             raise SolveError("a strip finds no balance")
         return super().predict(variants, values, deviations)
 
@@ -128,6 +129,24 @@ def test_nothing_is_added_to_what_has_no_solution_for_specimens_that_are_alike()
     )
     found = search(test)
     assert found.found is not None, "the search ends with an answer"
+
+
+def test_a_model_is_fitted_again_from_specimens_as_they_are_where_it_must_be():
+    """And left out where not even that has a solution."""
+    columns = {"wave": lambda t: np.sin(9.0 * t)}
+    effects = [linear_effect("wave")]
+    test = made(columns, columns["wave"], effects, OnlyAsSpecimensDiffer)
+    models, rows = Models(test, effects), test.readings.fit
+    scatter, start = Variances(NOISE, {"a": 0.1}), {"a": 10.0, "b": 2.0, "wave": 1.0}
+    deviations = {"a": np.full(RUNS, 0.01)}
+    forms = effects[0].variants
+    differ = fit(test, forms, start, rows, scatter, deviations=deviations)
+    assert differ.deviations
+    model = models.judge.weighed(differ, tuple(effects))
+    (found,) = models.with_solutions([model])
+    assert found.values["wave"] == pytest.approx(1.0, abs=0.05)
+    alike = replace(model, fit=replace(differ, deviations={}))
+    assert models.with_solutions([alike]) == []
 
 
 @pytest.mark.parametrize(

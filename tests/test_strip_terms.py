@@ -17,7 +17,7 @@ from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.cantilever import CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
-from fabric_fenicsx.loop.kinds.cantilever.terms import terms
+from fabric_fenicsx.loop.kinds.cantilever.terms import BEYOND, terms
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.loop.own_effects import read_effects
 from fabric_fenicsx.loop.report.discovered import Discovered, _shape_table
@@ -439,6 +439,40 @@ def test_a_picture_may_be_larger_for_long_overhangs():
         assert moved == pytest.approx([70.0 * share, -30.0 * share], abs=1e-6)
         moved = [float(as_ufl(v)) for v in forms["scale, step"].camera(values, at)]
         assert moved == pytest.approx([0.0, -30.0 * share], abs=1e-6)
+
+
+def test_heights_may_be_read_too_low_below_a_glare():
+    """By what soon grows no more: of depths, c (1 − e^(−|z|/w)) of the deepest picture."""
+    ranges = {"length": LENGTH, "curvature": 0.01, "x": 100.0, "z": 90.0}
+    every = {term.name: term for term in terms(ranges, ())}
+    for name, most in (("height", 90.0), ("distance", 100.0)):
+        term = every[f"reading_of_{name}"]
+        form = next(v for v in term.variants if v.label == "height, saturation")
+        values = {f"{term.name}_1": 0.1, f"{term.name}_width": 0.2}
+        whole, there = (
+            float(as_ufl(form.camera(values, {"x": at, "z": -at, "length": LENGTH})[1]))
+            for at in (1e4, 20.0)
+        )
+        size = 0.1 * BEYOND * 90.0
+        assert there == pytest.approx(size * (1.0 - np.exp(-20.0 / (0.2 * BEYOND * most))))
+        # Beyond the picture it is what it is at its edge.
+        assert whole == pytest.approx(size * (1.0 - np.exp(-1.0 / 0.2)))
+
+
+@pytest.mark.parametrize("acts_on", ["bending_moment", "rest_curvature", "load"])
+def test_something_may_lie_near_the_free_end(acts_on):
+    """A hem or a label, wherever the end is: a step and a bump that are counted from there."""
+    ranges = {"length": LENGTH, "curvature": 0.01, "x": 100.0, "z": 90.0}
+    every = [t for t in terms(ranges, ()) if t.acts_on == acts_on and "arc_length" in t.depends_on]
+    forms = {v.label: v for t in every for v in t.variants if v.label.endswith("from the free end")}
+    bump = forms["bump, from the free end"]
+    assert {"step, from the free end", "decay, from the free end"} <= set(forms)
+    name = bump.parameters[-1].name.removesuffix("_width")
+    values = {p.name: 0.0 for p in bump.parameters}
+    values |= {f"{name}_1": 2.0, f"{name}_place": 0.1, f"{name}_width": 0.03}
+    peak = [bump.shape.value(values, float(x)) for x in (0.1, 0.5)]
+    there, far = (float(as_ufl(value)) for value in peak)
+    assert there != 0.0 and far == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_camera_before_the_middle_of_each_overhang():

@@ -812,3 +812,20 @@ def test_laboratories_with_one_way_each_know_no_term(tmp_path):
 
     assert PictureFrame([laboratory("a", 0.5), laboratory("b", 5.0)]).terms == []
     assert PictureFrame([laboratory("a", 0.5), laboratory("b", 0.5, 5.0)]).terms
+
+
+@pytest.mark.parametrize(("ends", "there"), [((-0.6, 1.0), True), ((-0.1, 1.0), False)])
+def test_one_way_of_shearing_may_have_its_own_moment(ends, there):
+    """Where the frame went far to both sides: else it is a moment of the angle like any other."""
+    found = {term.name: term for term in terms(RANGES, {"displacement": ends})}
+    assert ("one_sided_moment_of_angle" in found) is there
+    if there:
+        forms = {form.label: form for form in found["one_sided_moment_of_angle"].variants}
+        for side, sign in (("above", 1.0), ("below", -1.0)):
+            form = forms[f"{side} nothing, corner"]
+            values = {p.name: 0.5 for p in form.parameters} | {
+                "one_sided_moment_of_angle_width": 0.002
+            }
+            (law,) = form.laws(values)
+            moments = marched(law, [0.6 * sign, 0.15 * sign, -0.6 * sign])[0]
+            assert moments == pytest.approx([0.25 * sign, 0.0, 0.0], abs=1e-3)

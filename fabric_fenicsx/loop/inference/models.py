@@ -102,17 +102,28 @@ class Models:
     def with_these_variances(self, model: Model, variances: Variances | None = None) -> Fit:
         """A model fitted with some variances, by default as they are now.
 
+        Specimens are alike at first, or as they are in the model where what they have in common
+        has no solution.
+
         Raises:
             SolveError: it has no solution.
         """
-        return fit(
-            self.experiment,
-            model.fit.variants,
-            model.fit.values,
-            model.fit.used,
-            variances or self.variances,
-            robust=CRITERIA.far,
-        )
+        of = self.experiment, model.fit.variants, model.fit.values, model.fit.used
+        own = variances or self.variances
+        try:
+            return fit(*of, own, robust=CRITERIA.far)
+        except SolveError:
+            return fit(*of, own, deviations=model.fit.deviations, robust=CRITERIA.far)
+
+    def with_solutions(self, models: Sequence[Model]) -> list[Fit]:
+        """Those models that have a solution with the variances as they are now, fitted so."""
+        found = []
+        for model in models:
+            try:
+                found.append(self.with_these_variances(model))
+            except SolveError:
+                continue
+        return found
 
     def fitted(
         self,

@@ -372,11 +372,11 @@ class Search:
             count: of effects that there are then.
             level: models of one effect less, the best first, which is the first of them.
         """
-        best = self.models.with_these_variances(level[0])
         if self._screened_first:
             # Terms, of which there are many, are tried in their forms when they are found.
-            return [best, *self._other_effects(level)]
-        return [best, *(self._other_forms(best) if count == 2 else [])]
+            return self.models.with_solutions([level[0], *self._other_effects(level)])
+        best = self.models.with_solutions(level[:1])
+        return [*best, *(self._other_forms(best[0]) if best and count == 2 else [])]
 
     def _together(self, count: int, bases: Sequence[Fit]) -> list[Model]:
         """Models of several effects, the best first.
@@ -393,14 +393,14 @@ class Search:
             fits += self.models.fitted(self._added_to(base), starts=starts, base=base, most=most)
         return self.models.ranked(fits)
 
-    def _other_effects(self, level: Sequence[Model]) -> list[Fit]:
+    def _other_effects(self, level: Sequence[Model]) -> list[Model]:
         """What comes next to the best of a level by itself, of terms that go by one variable.
 
         The best one may do some of the work of two, neither of which is then seen beside it.
         """
         best = set(level[0].effects)
         others = [m for m in level if not best & set(m.effects) and not m.effects[0].of_two]
-        return [self.models.with_these_variances(m) for m in others[: CRITERIA.other_effects]]
+        return others[: CRITERIA.other_effects]
 
     def _other_forms(self, model: Fit) -> list[Fit]:
         """The best fits of the same effects in other forms.
@@ -455,8 +455,7 @@ class Search:
                 break
             tried |= set(own)
             found: list[Fit] = []
-            for model in (fewer[k] for k in own):
-                base = self.models.with_these_variances(model)
+            for base in self.models.with_solutions([fewer[k] for k in own]):
                 more = self._added_to(base)
                 found += self.models.fitted(more, starts=1, base=base, most=CRITERIA.terms)
             levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
