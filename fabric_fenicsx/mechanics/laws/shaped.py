@@ -126,12 +126,17 @@ def broken(at: Crossing, past: Any, memory: Any, wear: Any) -> Any:
 
 
 def healed(at: Crossing, past: Any, memory: Any, wear: Any) -> Any:
-    """Share h of a structure that holds have built: dh/dt = (1 − h)/τ in one, else −h |γ̇|/d.
+    """Share h of a structure that rests have built: dh/dt = (1 − h)/τ in one, else −h |γ̇|/d.
 
-    None of it is there at first; as a friction that has to break away after each rest.
+    None of it is there at first; as of a friction that has to break away after each rest.
     """
-    spent = past * exp(-size_of(at.change) / wear)
-    return conditional(eq(at.change, 0), 1 - (1 - past) * kept(at.per_time, memory), spent)
+    built, spent = 1 - (1 - past) * kept(at.per_time, memory), exp(-size_of(at.change) / wear)
+    return conditional(_at_rest(at, memory, wear), built, past * spent)
+
+
+def _at_rest(at: Crossing, memory: Any, wear: Any) -> Any:
+    """Whether shear is so slow that it would spend next to nothing of what is built: |γ̇| τ ≪ d."""
+    return lt(size_of(at.rate) * memory, STILL * wear)
 
 
 VARIABLES: dict[str, Callable[[Crossing, Any, Any, Any], Any]] = {
@@ -180,6 +185,9 @@ OF_ELASTIC = ("elastic", "rest")
 
 ONSET = 0.005
 """Half of what a pulse takes to begin, as a share of the range."""
+
+STILL = 0.01
+"""Rate of spending over that of building below which a crossing is at rest."""
 
 LEAST = 1e-6
 """Largest angle below which none is relative to it [rad]."""
@@ -457,8 +465,9 @@ class ShapedLaw(CrossingLaw):
         """V at the end of the step."""
         value = self._value_at(at)
         if self.variable == "healed":
-            # What a hold builds is felt when it ends.
-            return conditional(eq(at.change, 0), at.past("felt"), value)
+            # What a rest builds is felt when it ends.
+            still = _at_rest(at, at.number(self.memory), at.number(self.wear))
+            return conditional(still, at.past("felt"), value)
         return value
 
     def _value_at(self, at: Crossing) -> Any:
