@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any
 
@@ -137,19 +138,29 @@ def diagnose(
     fabric = fabric_content(_with_measurements(parts, tests), folder or Path())
     if folder is not None:
         progress(1.0, "drawing")
-        write_fabric(folder, fabric)
-        if any(d.best is not None for d, _, _ in parts):
-            measured = _with_measurements(parts, tests)
-            write_fabric(folder, fabric_content(measured, folder, nearest=True), NEAREST)
-        else:
-            # That of an earlier diagnosis, which is none of these measurements' any more.
-            (folder / NEAREST).unlink(missing_ok=True)
-        for earlier in folder.glob(JOINED.format("*")):
-            earlier.unlink()
-        for name, content in joined_fabrics(_with_measurements(parts, tests), folder):
-            write_fabric(folder, content, JOINED.format(name))
-        write_report(folder, parts, report)
+        measured = _with_measurements(parts, tests)
+        # Whoever stops it while it draws finds nothing there.
+        with TemporaryDirectory(dir=folder, prefix=".writing-") as place:
+            drawn = Path(place)
+            write_fabric(drawn, fabric)
+            if any(d.best is not None for d, _, _ in parts):
+                write_fabric(drawn, fabric_content(measured, folder, nearest=True), NEAREST)
+            for name, content in joined_fabrics(measured, folder):
+                write_fabric(drawn, content, JOINED.format(name))
+            write_report(drawn, parts, report)
+            _moved(drawn, folder)
     return Found(report, tuple(diagnosis for diagnosis, _, _ in parts), fabric)
+
+
+def _moved(drawn: Path, folder: Path) -> None:
+    """Move what was written to where it belongs, report.json last.
+
+    Fabrics of an earlier diagnosis, which are none of these measurements' any more, are removed.
+    """
+    for earlier in (folder / NEAREST, *folder.glob(JOINED.format("*"))):
+        earlier.unlink(missing_ok=True)
+    for path in sorted(drawn.iterdir(), key=lambda path: path.name == "report.json"):
+        path.replace(folder / path.name)
 
 
 def _experiments(
