@@ -253,13 +253,3 @@ def test_general_forms_of_effects_with_names_are_no_other_effects(several, alike
     known = {name: linear_effect(name) for name in ("bend", "curl", "warm")} | {"law": law}
     named = [known["bend"], known["curl"]]
     assert _alike([known[name] for name in several], named) is alike
-
-
-def test_a_model_that_was_fitted_badly_alone_is_fitted_from_what_it_is_with_others():
-    """Of the same forms, the better fit joins those of one effect less."""
-    own = of_two_bends()
-    alone = next(m for m in own.singles if m.effects == (own.effects[0],))
-    level = [replace(alone, fit=replace(alone.fit, residual=2.0 * alone.fit.residual))]
-    assert one_search._is_new(alone.fit, level)
-    assert not one_search._is_new(alone.fit, [alone])
-    assert one_search._is_new(alone.fit, [])

@@ -34,9 +34,6 @@ from .variances import Variances
 
 __all__ = ["Search"]
 
-#: Error over that of another fit of the same model, below which it ended at another place.
-AS_FITTED = 0.98
-
 
 class Search:
     """One search, with what it carries from step to step."""
@@ -422,8 +419,7 @@ class Search:
     def _with_one_less(self, levels: list[list[Model]]) -> None:
         """The best model of the last level without each of its effects, among those before it.
 
-        Together with others an effect may have come out in a form that was not tried alone, or at
-        a place that was not found alone.
+        Together with others an effect may have come out in a form that was not tried alone.
         """
         if not levels[-1]:
             return
@@ -435,7 +431,8 @@ class Search:
                 found.append(fit(self.experiment, kept, best.values, best.used, variances))
             except SolveError:
                 continue
-        new = [f for f in found if _is_new(f, levels[-2])]
+        tried = {m.fit.variants for m in levels[-2]}
+        new = [f for f in found if f.variants not in tried]
         levels[-2] = self.models.best_refined([*levels[-2], *self.models.weighed(new)])
 
     def _exchanged(self, levels: list[list[Model]], bases: Sequence[Fit]) -> None:
@@ -501,12 +498,6 @@ class Search:
         singles = levels[1] if len(levels) > 1 else []
         limit = min((m.criterion for m in singles), default=0.0) + CRITERIA.decisive
         return tuple(dict.fromkeys(m.effects[0].name for m in singles if m.criterion < limit))
-
-
-def _is_new(found: Fit, level: Sequence[Model]) -> bool:
-    """Whether a level has no model of the same forms that leaves as little."""
-    left = (m.fit.rms(found.used) for m in level if m.fit.variants == found.variants)
-    return found.rms(found.used) < AS_FITTED * min(left, default=float("inf"))
 
 
 def _best_of(effect: Effect, levels: Sequence[Sequence[Model]]) -> Fit | None:
