@@ -253,3 +253,28 @@ def test_general_forms_of_effects_with_names_are_no_other_effects(several, alike
     known = {name: linear_effect(name) for name in ("bend", "curl", "warm")} | {"law": law}
     named = [known["bend"], known["curl"]]
     assert _alike([known[name] for name in several], named) is alike
+
+
+def test_a_model_that_was_fitted_badly_alone_is_fitted_from_what_it_is_with_others():
+    """Of the same forms, the better fit joins those of one effect less."""
+    own = of_two_bends()
+    alone = next(m for m in own.singles if m.effects == (own.effects[0],))
+    astray = replace(alone, fit=replace(alone.fit, residual=2.0 * alone.fit.residual))
+    assert one_search._is_new(alone.fit, [astray])
+    assert not one_search._is_new(alone.fit, [alone])
+    assert one_search._is_new(alone.fit, [])
+    # With another effect, of which nothing is left, it is where it should be.
+    both = own.judge.weighed(
+        fit(
+            own.experiment,
+            tuple(e.variants[0] for e in own.effects),
+            {**alone.fit.values, "wave": 0.0},
+            own.judge.rows,
+            alone.estimate.variances,
+        ),
+        tuple(own.effects),
+    )
+    levels = [[], [replace(astray, criterion=alone.criterion + 1e3)], [both]]
+    own._with_one_less(levels)
+    (best, *_) = [m for m in levels[1] if m.effects == alone.effects]
+    assert best.criterion == pytest.approx(alone.criterion, abs=1.0)

@@ -12,6 +12,7 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import product
 
 from ...errors import SolveError
 from ..kept import Kept
@@ -33,6 +34,9 @@ from .starts import Combination, ToFirstOrder
 from .variances import Variances
 
 __all__ = ["Search"]
+
+#: Error over that of another fit of the same model, below which it ended at another place.
+AS_FITTED = 0.98
 
 
 class Search:
@@ -419,20 +423,22 @@ class Search:
     def _with_one_less(self, levels: list[list[Model]]) -> None:
         """The best model of the last level without each of its effects, among those before it.
 
-        Together with others an effect may have come out in a form that was not tried alone.
+        Together with others an effect may have come out in a form that was not tried alone; or at
+        a place that was not found alone, with noise and specimens as they are there.
         """
         if not levels[-1]:
             return
-        best, variances = levels[-1][0].fit, self.models.variances
+        best, now = levels[-1][0].fit, self.models.variances
         found = []
-        for out in best.variants:
+        for out, variances in product(best.variants, (now, levels[-1][0].estimate.variances)):
             kept = tuple(v for v in best.variants if v is not out)
             try:
+                # What is interpolated is exact where it begins.
+                self.experiment.settle(kept, best.values)
                 found.append(fit(self.experiment, kept, best.values, best.used, variances))
             except SolveError:
                 continue
-        tried = {m.fit.variants for m in levels[-2]}
-        new = [f for f in found if f.variants not in tried]
+        new = [f for f in found if _is_new(f, levels[-2])]
         levels[-2] = self.models.best_refined([*levels[-2], *self.models.weighed(new)])
 
     def _exchanged(self, levels: list[list[Model]], bases: Sequence[Fit]) -> None:
@@ -498,6 +504,12 @@ class Search:
         singles = levels[1] if len(levels) > 1 else []
         limit = min((m.criterion for m in singles), default=0.0) + CRITERIA.decisive
         return tuple(dict.fromkeys(m.effects[0].name for m in singles if m.criterion < limit))
+
+
+def _is_new(found: Fit, level: Sequence[Model]) -> bool:
+    """Whether a level has no model of the same forms that leaves as little."""
+    left = (m.fit.rms(found.used) for m in level if m.fit.variants == found.variants)
+    return found.rms(found.used) < AS_FITTED * min(left, default=float("inf"))
 
 
 def _best_of(effect: Effect, levels: Sequence[Sequence[Model]]) -> Fit | None:
