@@ -12,7 +12,7 @@ from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.judge import Judge
-from fabric_fenicsx.loop.inference.models import _simplest_first, cancelling
+from fabric_fenicsx.loop.inference.models import cancelling, simplest_first
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.one_search import Search
 from fabric_fenicsx.loop.inference.search import diagnose_test
@@ -379,4 +379,4 @@ def test_of_models_that_are_as_good_the_simplest_comes_first(criteria, first):
         for criterion, (effect, count) in zip(criteria, kinds, strict=True)
     ]
     in_order = sorted(models, key=lambda m: m.criterion)
-    assert _simplest_first(in_order)[0] is models[first]
+    assert simplest_first(in_order)[0] is models[first]

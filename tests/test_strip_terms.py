@@ -216,7 +216,7 @@ def test_derivatives_of_every_term(arc):
             change = {name: float(rng.uniform(-1.0, 1.0)) * x for name, x in values.items()}
             _, slopes = experiment.predict((v, turning), values)
             along = sum(slopes[name] * change[name] for name in values)
-            step = 1e-3
+            step = 5e-4
             up, down = (
                 experiment.predict(
                     (v, turning), {name: x + h * change[name] for name, x in values.items()}
