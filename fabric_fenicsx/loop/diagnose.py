@@ -135,10 +135,10 @@ def diagnose(
         terms = discovered_terms(diagnosis, 1 + sum(len(found) for _, _, found in parts))
         parts.append((diagnosis, test_report(diagnosis, same, advice, terms), terms))
     report = combined_report([content for _, content, _ in parts])
-    fabric = fabric_content(_with_measurements(parts, tests), folder or Path())
+    measured = _with_measurements(parts, tests)
+    fabric = fabric_content(measured, folder or Path())
     if folder is not None:
         progress(1.0, "drawing")
-        measured = _with_measurements(parts, tests)
         # Whoever stops it while it draws finds nothing there.
         with TemporaryDirectory(dir=folder, prefix=".writing-") as place:
             drawn = Path(place)

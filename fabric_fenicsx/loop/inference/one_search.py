@@ -12,7 +12,6 @@ with fewer effects, and what it leaves must be noise: else nothing is claimed.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import product
 
 from ...errors import SolveError
 from ..kept import Kept
@@ -166,12 +165,9 @@ class Search:
             final = self.models.last(chosen)
             self.progress(0.9, "rivals")
             others = in_place(self.models, self._screened, final, levels, most)
-            ahead = [m for of in others.values() for each in of.values() for m in each]
-            ahead = [
-                m
-                for m in ahead
-                if m not in level and m.criterion < final.criterion - CRITERIA.decisive
-            ]
+            limit = final.criterion - CRITERIA.decisive
+            tried = (m for known in others.values() for mine in known.values() for m in mine)
+            ahead = [m for m in tried if m not in level and m.criterion < limit]
             if final.criterion > chosen.criterion + CRITERIA.decisive:
                 level[level.index(chosen)] = final
             elif not ahead:
@@ -428,14 +424,15 @@ class Search:
         """
         if not levels[-1]:
             return
-        best, now = levels[-1][0].fit, self.models.variances
+        best = levels[-1][0].fit
         found = []
-        for out, variances in product(best.variants, (now, levels[-1][0].estimate.variances)):
+        for out in best.variants:
             kept = tuple(v for v in best.variants if v is not out)
             try:
                 # What is interpolated is exact where it begins.
                 self.experiment.settle(kept, best.values)
-                found.append(fit(self.experiment, kept, best.values, best.used, variances))
+                for variances in (self.models.variances, levels[-1][0].estimate.variances):
+                    found.append(fit(self.experiment, kept, best.values, best.used, variances))
             except SolveError:
                 continue
         new = [f for f in found if _is_new(f, levels[-2])]

@@ -110,8 +110,8 @@ def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
     largest |= {"displacement_lag": ranges["displacement"]}
     largest |= {"mean_speed": ranges["speed"]}
     largest |= {"largest_angle": ranges["angle"], "unloading": 1.0, "recent_rate": ranges["rate"]}
-    largest |= {"relative_angle": 1.0, "since_reversal": ranges["angle"], "broken": 1.0}
-    largest["healed"] = 1.0
+    largest |= {"relative_angle": 1.0, "since_reversal": ranges["angle"]}
+    largest |= dict.fromkeys(STRUCTURE, 1.0)
     largest |= {f"recent_square_of_{name}": ranges[name] ** 2 for name in ("angle", "rate")}
     largest["recent_work"] = ranges["angle"] * ranges["rate"]
     if ranges.get("run_of_folder", 0.0) >= FEWEST_BEFORE:
@@ -291,8 +291,7 @@ ABOUT = {
 
 
 CALLED = {
-    "broken": "history",
-    "healed": "history",
+    **dict.fromkeys(STRUCTURE, "history"),
     "unloading": "direction",
     "relative_angle": "largest_angle",
     "since_reversal": "history",
