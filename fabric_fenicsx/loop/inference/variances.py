@@ -42,11 +42,11 @@ SCATTER_UNIT, SHARE_UNIT = 0.01, 4e-4
 HARDLY = 1e-3
 #: Scatter below which specimens may as well be alike.
 SMALL_SCATTER = 0.03
-#: Gain of −2 log likelihood in a step below which it is the last one.
-ENOUGH = 1e-7
-#: ... in all, beyond which that step, which is a share of it, was not yet a small one.
+#: The search ends where each component, by its size, changes −2 log likelihood by less than that.
+OPTIONS = {"maxiter": 60, "ftol": 1e-9, "gtol": 1e-2}
+#: Gain of −2 log likelihood beyond which sizes are taken again, from where the search ended.
 FAR = 100.0
-#: Times that the search begins anew from where a step was far.
+#: Times that it then begins anew.
 RESTARTS = 20
 #: Values of a scatter that are tried.
 TRIED = 21
@@ -145,19 +145,30 @@ def estimate(
     # Were all bounds finite, the first step would be the whole gradient: into a corner of them.
     bounds: list[tuple[float, float]] = [(-4.0, 4.0), (0.0, correlated), (0.0, np.inf)]
     bounds += [(0.0, np.inf)] * (len(groups) + smooth)
-    x0 = np.clip(begin, [low for low, _ in bounds], [high for _, high in bounds])
-    options = {"maxiter": 60, "ftol": ENOUGH}
+    lower, upper = np.array(bounds).T
+    x0 = np.clip(begin, lower, upper)
 
     def likeliest(x: Array) -> Array:
         for _ in range(RESTARTS):
             problem.origin = problem.cost(x)[problem.of]
+            size = problem.sizes(x)
+
+            def scaled(z: Array, size: Array = size) -> tuple[float, Array]:
+                cost, slope = problem.with_slope(np.clip(z * size, lower, upper))
+                return cost, slope * size
+
             found = minimize(
-                problem.with_slope, x, method="L-BFGS-B", jac=True, bounds=bounds, options=options
+                scaled,
+                x / size,
+                method="L-BFGS-B",
+                jac=True,
+                bounds=list(zip(lower / size, upper / size, strict=True)),
+                options=OPTIONS,
             )
+            x, before = np.clip(found.x * size, lower, upper), x
             # A gain without a step is round-off.
-            if -found.fun <= FAR or np.array_equal(found.x, x):
-                return np.asarray(found.x)
-            x = np.asarray(found.x)
+            if -found.fun <= FAR or np.array_equal(x, before):
+                break
         return x
 
     def alike(x: Array) -> Array:
@@ -247,8 +258,8 @@ class _Solved:
         noise, taus: the components.
         white: the columns.
         scale: s of each but the residual.
-        matrix: M = 1 + s WᵀW s; no 1 where a column's size is free.
-        by: s Wᵀr.
+        matrix: M = 1 + s G s; no 1 where a column's size is free.
+        by: s times the products with the residual.
         chi: weighted sum of squares.
         costs: −2 log restricted likelihood and −2 log likelihood.
     """
@@ -316,6 +327,32 @@ class _Problem:
         found = self._solved(x)
         return found.costs[self.of] - self.origin, self._slope(found)
 
+    def sizes(self, x: Array) -> Array:
+        """By how much each may change before −2 log likelihood does by one or so, (n_x,).
+
+        From the expected information, of each by itself.
+        """
+        found = self._solved(x)
+        noise, white, s, floor = found.noise, found.white, found.scale, found.noise.floor
+        G, p, n = white.products, self._common.shape[1], len(self._at.residual)
+        Y = G[:-1, :-1] * s / floor
+        P = G[:-1, :-1] / floor**2 - Y @ np.linalg.inv(found.matrix) @ Y.T
+        ends = np.cumsum([p, *(b.shape[1] for b in self._blocks), self._lines.shape[1]])
+        own = np.array([float(np.sum(P[i:j, i:j] ** 2)) for i, j in pairwise(ends)])
+        of_taus, of_omega = own[:-1], own[-1:] * floor**4
+        share = (SHARE_UNIT / floor**2) * 2.0 * white.growth
+        along = noise.correlation
+        information = np.array(
+            [
+                4.0 * n,
+                2.0 * n * (1.0 + along**2) / (1.0 - along**2) ** 2,
+                float(share @ share),
+                *(of_taus * SCATTER_UNIT**2),
+                *(of_omega if self._smooth else ()),
+            ]
+        )
+        return 1.0 / np.sqrt(information + 1e-2)
+
     def _solved(self, x: Array) -> _Solved:
         noise, taus, omega = self.split(x)
         white = self._whitened(noise)
@@ -342,8 +379,8 @@ class _Problem:
 
         With V = f² (Σ₁ + ω² S Sᵀ) + Σ τ² D Dᵀ, P its inverse less what θ takes off and ρ = P r, a
         column d of S or D whose variance is v has ∂/∂v = dᵀPd − (dᵀρ)². V as a whole and floor and
-        τ together scale alike, which gives ∂/∂f; Σ₁ goes by way of the white columns W, of which
-        the cost knows the products WᵀW alone: ∂/∂W = 2 W H.
+        τ together scale alike, which gives ∂/∂f; Σ₁ goes by way of the products G of the white
+        columns, which are all that the cost knows: ∂/∂G = H.
         """
         noise, white, s, floor = found.noise, found.white, found.scale, found.noise.floor
         G, p, n = white.products, self._common.shape[1], len(self._at.residual)
@@ -364,7 +401,7 @@ class _Problem:
         H[:-1, :-1] = (inverse + np.outer(u, u)) * np.outer(s, s)
         H[:-1, -1] = H[-1, :-1] = -s * u / floor
         H[-1, -1] = 1.0 / floor**2
-        of_share, of_correlation = white.slopes(2.0 * white.columns @ H)
+        of_share, of_correlation = white.slopes(H)
         square = (noise.share / floor) ** 2
         typical = 0.0
         if self._given is not None:
