@@ -412,6 +412,30 @@ def test_moments_on_one_way_alone(base, gamma, before, moment):
 
 
 @pytest.mark.parametrize(
+    ("base", "gamma", "before", "stick", "moment"),
+    [
+        ("opening above", 0.3, 0.2, 0.0, 3.0),
+        ("opening above", 0.2, 0.3, 0.0, 0.0),
+        ("opening above", -0.3, -0.2, 0.0, 0.0),
+        ("opening below", -0.3, -0.2, 0.0, -3.0),
+        ("opening below", -0.2, -0.3, 0.0, 0.0),
+        ("closing above", 0.2, 0.3, 0.0, 3.0),
+        ("closing above", 0.3, 0.3, 1.0, 0.0),
+        ("closing below", -0.3, -0.2, 0.0, 0.0),
+        ("closing below", -0.3, -0.3, 0.5, -2.25),
+        ("opening", 0.3, 0.2, 0.0, 3.0),
+        ("opening", -0.3, -0.2, 0.0, -3.0),
+        ("closing", -0.3, -0.2, 0.0, 0.0),
+        ("closing", -0.3, -0.3, 0.5, -2.25),
+    ],
+)
+def test_moments_on_one_way_as_a_stick_is_bent(base, gamma, before, stick, moment):
+    """Fully after more than the stick's angle, and as it was in a hold."""
+    law = ShapedLaw(base, "angle", 0.05, (1.0,), constant=2.0, stick_angle=0.05)
+    assert evaluated(law.moment(crossing(gamma, before, {"stick": stick}))) == pytest.approx(moment)
+
+
+@pytest.mark.parametrize(
     "numbers",
     [
         {"base": "rest", "constant": 0.02},
@@ -424,6 +448,7 @@ def test_moments_on_one_way_alone(base, gamma, before, moment):
         {"base": "smooth", "variable": "broken", "reach": 1.0, "memory_s": 2.0, "constant": 0.5},
         {"base": "dissipative", "variable": "healed", "reach": 1.0, "wear_angle_deg": 2.0},
         {"base": "above", "variable": "angle", "shape": "corner", "place": 0.2},
+        {"base": "closing above", "variable": "angle", "shape": "bump", "place": 0.6},
     ],
     ids=[
         "state of rest",
@@ -436,6 +461,7 @@ def test_moments_on_one_way_alone(base, gamma, before, moment):
         "structure",
         "rest",
         "one side",
+        "one side, one way",
     ],
 )
 def test_other_factors_are_the_same_in_both(numbers):

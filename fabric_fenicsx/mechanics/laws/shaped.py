@@ -60,6 +60,12 @@ Base = Literal[
     "even",
     "above",
     "below",
+    "opening",
+    "closing",
+    "opening above",
+    "opening below",
+    "closing above",
+    "closing below",
     "odd_in_rate",
     "even_in_rate",
     "outward",
@@ -174,7 +180,17 @@ time since the beginning [s];
 all but the first two remember.
 """
 
-FRICTION = ("dissipative", "smooth", "flowing")
+SIDES = {"": (1, 1), " above": (1, 0), " below": (0, 1)}
+"""Whether something is there where γ > 0, and where γ < 0, by what its base is called."""
+
+ONE_WAY = {
+    f"{way}{side}": (of_way, *there)
+    for way, of_way in (("opening", 1), ("closing", -1))
+    for side, there in SIDES.items()
+}
+"""Bases of one way: 1 where |γ| grows, −1 where it falls, and the sides."""
+
+FRICTION = ("dissipative", "smooth", "flowing", *ONE_WAY)
 """Bases that remember how far a stick is bent."""
 
 GRADED = (0.05, 0.1, 0.2, 0.4)
@@ -375,7 +391,9 @@ class ShapedLaw(CrossingLaw):
             of limit 1 with a stick, "smooth" Dahl's of limit 1, "flowing" a stick that gives way
             the faster the more it is bent, ds/dt = (γ̇ − r s |s|^(n−1))/δ (F. H. Norton, The Creep
             of Steel at High Temperatures, 1929), 1 where γ̇ is r for long, "odd" sign γ, "even" 1,
-            "above" 1 where γ > 0, "below" −1 where γ < 0, "odd_in_rate" sign γ̇, "even_in_rate" 1,
+            "above" 1 where γ > 0, "below" −1 where γ < 0, "opening" or "closing" sign γ while |γ|
+            grows or falls, as far as a friction's stick has come over, also one of these "above" or
+            "below" alone, "odd_in_rate" sign γ̇, "even_in_rate" 1,
             "outward" sign γ while |γ| grows, "forward" 1 while γ grows. Of "rest" it is no factor
             but an angle, to which the spring has moved its state of rest: with e the elastic moment
             and s the sign of γ where it was largest so far, M = e(γ − s (c₀ + f)) − e(γ), as of a
@@ -533,7 +551,7 @@ class ShapedLaw(CrossingLaw):
         if self.base == "rest":
             history |= {"largest": max_value(at.past("largest"), at.size), "side": self._side(at)}
         if self.base in FRICTION:
-            history["stick"] = self._base_at(at)
+            history["stick"] = self._stick(at)
         return history
 
     def _side(self, at: Crossing) -> Any:
@@ -544,14 +562,8 @@ class ShapedLaw(CrossingLaw):
     def _elastic(self, at: Crossing, gamma: Any) -> Any:
         return at.number(self.k1) * gamma + at.number(self.k3) * gamma**3
 
-    def _base_at(self, at: Crossing) -> Any:
-        if self.base == "elastic":
-            return self._elastic(at, at.gamma)
-        if self.base == "viscous":
-            return at.rate
-        if self.base == "dissipative":
-            trial = at.past("stick") + at.change / at.number(self.stick_angle)
-            return max_value(min_value(trial, 1), -1)
+    def _stick(self, at: Crossing) -> Any:
+        """The moment of a friction over its limit."""
         if self.base == "smooth":
             step = at.change / at.number(self.stick_angle)
             kept, sign = exp(-size_of(step)), conditional(ge(step, 0), 1.0, -1.0)
@@ -561,6 +573,20 @@ class ShapedLaw(CrossingLaw):
             stick, n = at.number(self.stick_angle), at.number(self.exponent)
             half = at.number(self.flow_rate) / (2 * stick * at.per_time)
             return flowed(flowed(at.past("stick"), half, n) + at.change / stick, half, n)
+        trial = at.past("stick") + at.change / at.number(self.stick_angle)
+        return max_value(min_value(trial, 1), -1)
+
+    def _base_at(self, at: Crossing) -> Any:
+        if self.base == "elastic":
+            return self._elastic(at, at.gamma)
+        if self.base == "viscous":
+            return at.rate
+        if self.base in ONE_WAY:
+            way, above, below = ONE_WAY[self.base]
+            ahead, behind = 1 + way * self._stick(at), 1 - way * self._stick(at)
+            return conditional(ge(at.gamma, 0), above * ahead / 2, -below * behind / 2)
+        if self.base in FRICTION:
+            return self._stick(at)
         if self.base == "odd":
             return signed(at.gamma, 1.0)
         if self.base == "above":

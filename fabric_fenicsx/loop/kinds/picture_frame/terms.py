@@ -14,7 +14,7 @@ from typing import Any
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.lagging import Lagging
 from ....mechanics.laws.law import CrossingLaw
-from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ShapedLaw
+from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ONE_WAY, ShapedLaw
 from ...inference.effects import Effect, Shape, Values, valued
 from ..records import FEWEST_BEFORE
 from .rig_terms import rig_terms
@@ -96,7 +96,7 @@ def terms(
     largest = ranges_of(ranges)
     return [
         *_of_the_crossing(largest),
-        *_on_one_side(largest, ends.get("displacement", (0.0, 1.0))),
+        *_of_one_way(largest, ends.get("displacement", (0.0, 1.0))),
         *_flowing(largest),
         *_lagging(largest),
         *rig_terms(largest, ends, specimens),
@@ -171,29 +171,39 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             )
 
 
-def _on_one_side(largest: Mapping[str, float], ends: tuple[float, float]) -> Iterator[Effect]:
-    """What only one way of shearing has, as a stitch that it draws tight; if there were both."""
-    if ends[0] > -SIDE or ends[1] < SIDE:
-        return
-    name = "one_sided_moment_of_angle"
+def _of_one_way(largest: Mapping[str, float], ends: tuple[float, float]) -> Iterator[Effect]:
+    """What only one way of shearing has, as a stitch that it draws tight; if there were both.
+
+    And what there is only while that opens, or closes: edges of tows that catch on the way there.
+    """
+    both = ends[0] <= -SIDE and ends[1] >= SIDE
     # A line and a cube are the baseline's and an even moment's.
     chosen = ("2 coefficients", "step", "saturation", "corner")
-    drawn = [one for one in shapes(name, 4) if one[0] in chosen] + [*bumps(name)]
-    fixed = {"variable": "angle", "reach": largest["angle"]}
-    forms = [
-        _law_form(f"{base} nothing, {label}", {**fixed, "base": base, **numbers, "coefficients": c})
-        for base in ("above", "below")
-        for label, c, numbers in drawn
-    ]
-    yield Effect(
-        name,
-        "picture_frame",
-        "moment of one way of shearing alone, by the angle",
-        tuple(forms),
-        of_fabric=False,
-        acts_on="moment",
-        depends_on=("angle",),
+    kinds: tuple[tuple[str, Iterable[str], tuple[str, ...]], ...] = (
+        ("one_sided_moment_of_angle", ("above", "below") if both else (), ()),
+        ("one_way_moment_of_angle", ONE_WAY if both else ("opening", "closing"), ("direction",)),
     )
+    for name, bases, also in kinds:
+        drawn = [one for one in shapes(name, 4) if one[0] in chosen] + [*bumps(name)]
+        fixed = {"variable": "angle", "reach": largest["angle"]}
+        forms = [
+            _law_form(f"{base}, {label}", fixed | own | numbers | {"coefficients": c})
+            for base in bases
+            for own in [{"base": base, **remembering(name, base, "angle", largest)}]
+            for label, c, numbers in drawn
+        ]
+        if forms:
+            words = "one way" if also else "one side"
+            yield Effect(
+                name,
+                "picture_frame",
+                f"moment of {words} of shearing alone, by the angle",
+                tuple(forms),
+                # A weave does not know one side from the other.
+                of_fabric=bool(also),
+                acts_on="moment",
+                depends_on=("angle", *also),
+            )
 
 
 def _flowing(largest: Mapping[str, float]) -> Iterator[Effect]:
