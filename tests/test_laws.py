@@ -487,6 +487,7 @@ def test_what_lags_is_the_same_in_both(numbers):
     [
         {"base": "odd", "variable": "largest_angle", "powers": [1, 3], "constant": 0.0},
         {"base": "dissipative", "variable": "path", "powers": [0, 1], "constants": [0.1, 0.2]},
+        {"base": "above", "variable": "path", "powers": [0, 1], "course": "saturation"},
     ],
 )
 def test_a_factor_of_two_variables_is_the_same_in_both(numbers):

@@ -819,10 +819,13 @@ def test_one_way_of_shearing_may_have_its_own_moment(ends, there):
     """Where the frame went far to both sides: else it is a moment of the angle like any other."""
     found = {term.name: term for term in terms(RANGES, {"displacement": ends})}
     assert ("one_sided_moment_of_angle" in found) is there
+    ways = {form.label.split(",")[0] for form in found["one_way_moment_of_angle"].variants}
+    sides = {f"{way} {side}" for way in ("opening", "closing") for side in ("above", "below")}
+    assert ways == {"opening", "closing"} | (sides if there else set())
     if there:
         forms = {form.label: form for form in found["one_sided_moment_of_angle"].variants}
         for side, sign in (("above", 1.0), ("below", -1.0)):
-            form = forms[f"{side} nothing, corner"]
+            form = forms[f"{side}, corner"]
             values = {p.name: 0.5 for p in form.parameters} | {
                 "one_sided_moment_of_angle_width": 0.002
             }

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...errors import SolveError
+from .beside import forms_beside
 from .criteria import CRITERIA
 from .effects import Effect, Variant
 from .experiment import Experiment, Flags, each_by_itself
@@ -176,6 +177,16 @@ class Models:
         alike = dict.fromkeys(model.fit.variances.scatter, ALIKE)
         own = Variances(model.estimate.variances.noise, alike)
         return self.with_these_variances(model, own)
+
+    def in_all_forms(self, model: Model, out: Effect, other: Effect) -> list[Fit]:
+        """A model with each form of an effect in the place of one of its own."""
+        kept = tuple(v for v in model.fit.variants if v not in out.variants)
+        of = self.experiment, kept, model.fit.values, model.fit.used
+        try:
+            base = fit(*of, self.variances)
+        except SolveError:
+            return []
+        return self.fitted(forms_beside(self.experiment, base, [other]), starts=1, base=base)
 
     def effects_of(self, model: Fit) -> tuple[Effect, ...]:
         """Effects of a fitted model, in the order of its forms."""

@@ -478,14 +478,7 @@ class Search:
             if (effect, frozenset(kept)) in self._in_all_forms:
                 continue
             self._in_all_forms.add((effect, frozenset(kept)))
-            try:
-                base = fit(
-                    self.experiment, kept, best.fit.values, best.fit.used, self.models.variances
-                )
-            except SolveError:
-                continue
-            own = forms_beside(self.experiment, base, [effect])
-            found += self.models.fitted(own, starts=1, base=base)
+            found += self.models.in_all_forms(best, effect, effect)
         if found:
             levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
 

@@ -48,8 +48,20 @@ def in_place(
                 if model.criterion < final.criterion + REFINED_WITHIN:
                     (other,) = set(model.effects) - set(kept)
                     known[other].append(models.refined(model))
+            for other, mine in known.items():
+                # In the form that was tried it may be behind.
+                if any(_leaves_as_little(m, final) for m in mine):
+                    mine += models.best_refined(
+                        models.weighed(models.in_all_forms(final, own, other))
+                    )
         found[own] = known
     return found
+
+
+def _leaves_as_little(model: Model, final: Model) -> bool:
+    """Whether a model leaves about as much as another one, as another form of an effect may."""
+    mine, its = (m.fit.rms(final.fit.used) for m in (model, final))
+    return mine <= (1.0 + CRITERIA.other_form) * its
 
 
 def rivals_of(models: Models, final: Model, others: InPlace) -> dict[str, list[str]]:

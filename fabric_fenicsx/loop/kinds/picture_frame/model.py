@@ -87,8 +87,9 @@ class PictureFrame(CrossheadTest):
             whole = self._past_of_specimens["path"] + self._paths
             ranges["path_of_specimen"] = float(whole[fitted].max())
         largest = ranges_of(ranges)
-        of_one = [*terms(largest, self._ends(), self._specimens), *run_terms(largest)]
-        return [*of_one, *products(largest), *rig_products(largest)]
+        ends = self._ends()
+        of_one = [*terms(largest, ends, self._specimens), *run_terms(largest)]
+        return [*of_one, *products(largest, ends), *rig_products(largest)]
 
     @property
     def _specimens(self) -> list[int]:

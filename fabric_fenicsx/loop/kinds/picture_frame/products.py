@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 from ....inputs.parameters import Parameter
@@ -23,6 +24,7 @@ from .shapes import (
     SQUARES,
     STOP_WIDTHS,
     STOPS,
+    Ends,
     X,
     Y,
     bumps,
@@ -34,7 +36,7 @@ from .shapes import (
     remembered_since,
     shapes,
 )
-from .terms import as_reported, of_a_law, remembering
+from .terms import as_reported, both_ways, of_a_law, remembering
 from .variant import FrameVariant
 
 __all__ = ["products"]
@@ -95,18 +97,28 @@ KINDS = (
 rate, a dashpot and a friction that depend on the angle, likewise."""
 
 
-def products(largest: Mapping[str, float]) -> list[Effect]:
+def products(largest: Mapping[str, float], ends: Ends = MappingProxyType({})) -> list[Effect]:
     """The terms of a picture frame over two variables.
 
     Args:
         largest: sizes of the variables; see terms.ranges_of.
+        ends: between which shares of these the signed ones are.
     """
+    sides = ("above", "below") if both_ways(ends) else ()
     found = []
     for kind in KINDS:
         for by, variables in as_reported(kind.by).items():
             name = f"{kind.base}_moment_of_{kind.also}_and_{by}"
             forms = [form for v in variables for form in _forms(kind, name, v, largest)]
             forms += [form for w in variables for form in _turned(kind, name, w, largest)]
+            if kind.base == "odd":
+                # What only one way of shearing has.
+                forms += [
+                    form
+                    for w in variables
+                    for base in sides
+                    for form in _in_courses(replace(kind, base=base), name, w, largest)
+                ]
             words = f"{kind.base} moment, by {kind.also} and {by} together"
             found.append(
                 Effect(
@@ -154,10 +166,7 @@ def _turned(
     """Forms in which a shape over the angle goes by powers of a history, or moves with it."""
     if not kind.turned or history not in HISTORIES:
         return
-    fixed: dict[str, Any] = {"base": kind.base, "variable": kind.also, "also": history}
-    fixed |= {"reach": largest[kind.also], "also_reach": largest[history]}
-    fixed |= remembering(name, kind.base, kind.also, largest)
-    words = history.replace("_", " ")
+    fixed, words = _at_the_angle(kind, name, history, largest), history.replace("_", " ")
     for powers in kind.turned:
         said = f"powers {', '.join(map(str, powers))} of {words}"
         for label, one, numbers in (*bumps(name), *shapes(name, 2)):
@@ -166,15 +175,34 @@ def _turned(
                 own = fixed | numbers | {"powers": powers, "coefficients": coefficients}
                 yield _form(f"{kind.also}, {label}, {said}", own, "", None)
     if kind.base in IN_A_COURSE:
-        for label, one, numbers in (*bumps(name), *shapes(name, 2)):
-            if label in AT_AN_ANGLE:
-                yield from _in_a_course(kind, name, words, label, one, fixed | numbers)
+        yield from _in_courses(kind, name, history, largest)
     if kind.base != "viscous":
         # A dashpot that depends on nothing is in the baseline.
         fixed["constants"] = (Parameter(f"{name}_0_0", amplitude=True),)
     for label, one, numbers in moving(name, WAVES, step=1.0):
         own = fixed | numbers | {"powers": (0,), "coefficients": one}
         yield _form(f"{kind.also}, {label} with the {words}", own, "", None)
+
+
+def _at_the_angle(
+    kind: _Kind, name: str, history: str, largest: Mapping[str, float]
+) -> dict[str, Any]:
+    """Numbers of a shape over the angle that goes by a history."""
+    fixed: dict[str, Any] = {"base": kind.base, "variable": kind.also, "also": history}
+    fixed |= {"reach": largest[kind.also], "also_reach": largest[history]}
+    return fixed | remembering(name, kind.base, kind.also, largest)
+
+
+def _in_courses(
+    kind: _Kind, name: str, history: str, largest: Mapping[str, float]
+) -> Iterator[FrameVariant]:
+    """Forms of what is at an angle, or begins at one, in the course of a history."""
+    if history not in HISTORIES:
+        return
+    fixed, words = _at_the_angle(kind, name, history, largest), history.replace("_", " ")
+    for label, one, numbers in (*bumps(name), *shapes(name, 2)):
+        if label in AT_AN_ANGLE:
+            yield from _in_a_course(kind, name, words, label, one, fixed | numbers)
 
 
 def _in_a_course(
@@ -202,7 +230,8 @@ def _in_a_course(
     about = {**numbers, "place": place, "width": width}
     about |= {"powers": COMES_OR_GOES, "coefficients": coefficients}
     for said, course in courses(name):
-        yield _form(f"{kind.also}, {label} {said} with the {words}", about | course, "", None)
+        where = kind.base if kind.base in ("above", "below") else kind.also
+        yield _form(f"{where}, {label} {said} with the {words}", about | course, "", None)
 
 
 def _shapes(

@@ -40,7 +40,7 @@ from .shapes import (
 )
 from .variant import FrameVariant
 
-__all__ = ["as_reported", "of_a_law", "ranges_of", "remembering", "terms"]
+__all__ = ["as_reported", "both_ways", "of_a_law", "ranges_of", "remembering", "terms"]
 
 #: As far to either side, as a share of the largest displacement, one of them may have its own.
 SIDE = 0.2
@@ -96,7 +96,7 @@ def terms(
     largest = ranges_of(ranges)
     return [
         *_of_the_crossing(largest),
-        *_of_one_way(largest, ends.get("displacement", (0.0, 1.0))),
+        *_of_one_way(largest, both_ways(ends)),
         *_flowing(largest),
         *_lagging(largest),
         *rig_terms(largest, ends, specimens),
@@ -171,12 +171,21 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             )
 
 
-def _of_one_way(largest: Mapping[str, float], ends: tuple[float, float]) -> Iterator[Effect]:
+def both_ways(ends: Ends) -> bool:
+    """Whether what was read is of shearing both ways.
+
+    Args:
+        ends: between which shares of their largest sizes variables were.
+    """
+    low, high = ends.get("displacement", (0.0, 1.0))
+    return low <= -SIDE and high >= SIDE
+
+
+def _of_one_way(largest: Mapping[str, float], both: bool) -> Iterator[Effect]:
     """What only one way of shearing has, as a stitch that it draws tight; if there were both.
 
     And what there is only while that opens, or closes: edges of tows that catch on the way there.
     """
-    both = ends[0] <= -SIDE and ends[1] >= SIDE
     # A line and a cube are the baseline's and an even moment's.
     chosen = ("2 coefficients", "step", "saturation", "corner")
     kinds: tuple[tuple[str, Iterable[str], tuple[str, ...]], ...] = (
