@@ -48,7 +48,9 @@ class Criteria:
             not, if the residual has structure; made-up.
         roughly: ... up to which terms without a formula, whose shapes are not the law itself,
             explain what nothing else does; ``rough_form`` as other_form; made-up.
-        enough: ... up to which a further effect is not claimed, whatever it gains; made-up.
+        enough: ... up to which a further effect is not claimed, whatever it gains; times another
+            model's error up to which an effect in the place of one of several is tried in all its
+            forms; made-up.
         settled: ... up to which no further effect is looked for; made-up.
         scatter: ... and if it has none: nobody knows their noise better; made-up.
         usual_scatter: of specimens, as a share of a parameter (half-normal prior); made-up.

@@ -49,7 +49,7 @@ def in_place(
                     (other,) = set(model.effects) - set(kept)
                     known[other].append(models.refined(model))
             for other, mine in known.items():
-                # In the form that was tried it may be behind.
+                # It may be behind only in the forms that were tried.
                 if any(_leaves_as_little(m, final) for m in mine):
                     mine += models.best_refined(
                         models.weighed(models.in_all_forms(final, own, other))
@@ -59,9 +59,9 @@ def in_place(
 
 
 def _leaves_as_little(model: Model, final: Model) -> bool:
-    """Whether a model leaves about as much as another one, as another form of an effect may."""
+    """Whether a model leaves hardly more than another one."""
     mine, its = (m.fit.rms(final.fit.used) for m in (model, final))
-    return mine <= (1.0 + CRITERIA.other_form) * its
+    return mine <= CRITERIA.enough * its
 
 
 def rivals_of(models: Models, final: Model, others: InPlace) -> dict[str, list[str]]:
