@@ -12,10 +12,11 @@ from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference import starts
 from fabric_fenicsx.loop.inference.criteria import CRITERIA
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
+from fabric_fenicsx.loop.inference.first_order import ToFirstOrder, signatures
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.screen import Screen
-from fabric_fenicsx.loop.inference.starts import ToFirstOrder, fit_combinations, signatures
+from fabric_fenicsx.loop.inference.starts import fit_combinations
 from fabric_fenicsx.loop.inference.variances import Variances
 
 NOISE, TAU = Noise(0.1, 0.0, 0.3), 0.2

@@ -18,9 +18,9 @@ from .fabric import JOINED, NEAREST, fabric_content, fabric_file, joined_fabrics
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect
 from .inference.experiment import Experiment
+from .inference.first_order import SMALL
 from .inference.next_tests import next_tests
 from .inference.search import diagnose_test
-from .inference.starts import SMALL
 from .kinds import KINDS
 from .measurement.kind import Kind
 from .measurement.reading import read_folder

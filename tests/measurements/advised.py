@@ -25,10 +25,11 @@ from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.effects import Variant
 from fabric_fenicsx.loop.inference.experiment import Experiment
+from fabric_fenicsx.loop.inference.first_order import signatures
 from fabric_fenicsx.loop.inference.fitting import Fit, fit
 from fabric_fenicsx.loop.inference.next_tests import NextTest, next_tests
 from fabric_fenicsx.loop.inference.noise import Noise
-from fabric_fenicsx.loop.inference.starts import fit_combinations, signatures
+from fabric_fenicsx.loop.inference.starts import fit_combinations
 from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds import kind_of
 from fabric_fenicsx.loop.measurement.proposal import Proposal

@@ -12,10 +12,11 @@ from .beside import forms_beside
 from .criteria import CRITERIA
 from .effects import Effect, Variant
 from .experiment import Experiment, Flags, each_by_itself
+from .first_order import SMALL, Combination
 from .fitting import Fit, fit, parameters_of, soft_size
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise
-from .starts import SMALL, Combination, around_jumps, fit_combinations
+from .starts import around_jumps, fit_combinations
 from .variances import Variances
 
 __all__ = ["REFINED_WITHIN", "Models", "nearest_forms", "nothing_left", "simplest_first"]

@@ -22,6 +22,7 @@ from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis, Verdict
 from .effects import Effect, Variant
 from .experiment import Experiment
+from .first_order import Combination, ToFirstOrder
 from .fitting import Fit, fit
 from .judge import Model
 from .models import Models, nothing_left, simplest_first
@@ -29,7 +30,6 @@ from .noise import quantum
 from .notes import errors_beside, noise_source, notes_of
 from .rivals import InPlace, in_place, pairs_of, rivals_of
 from .screen import Screen, Signatures
-from .starts import Combination, ToFirstOrder
 from .variances import Variances
 
 __all__ = ["Search"]

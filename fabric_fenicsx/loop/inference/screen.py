@@ -22,8 +22,8 @@ import numpy.typing as npt
 from scipy.stats import chi2
 
 from .effects import Effect, Variant
+from .first_order import Combination, Signature, ToFirstOrder
 from .fitting import Fit
-from .starts import Combination, Signature, ToFirstOrder
 
 __all__ = ["Screen", "Signatures"]
 
