@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 import numpy.typing as npt
@@ -42,8 +43,8 @@ SCATTER_UNIT, SHARE_UNIT = 0.01, 4e-4
 HARDLY = 1e-3
 #: Scatter below which specimens may as well be alike.
 SMALL_SCATTER = 0.03
-#: The search ends where each component, by its size, changes −2 log likelihood by less than that.
-OPTIONS = {"maxiter": 60, "ftol": 1e-9, "gtol": 1e-2}
+#: The search ends where a step changes −2 log likelihood by less than that.
+OPTIONS = {"maxiter": 60, "ftol": 1e-4}
 #: Gain of −2 log likelihood beyond which sizes are taken again, from where the search ended.
 FAR = 100.0
 #: Times that it then begins anew.
@@ -141,11 +142,8 @@ def estimate(
     begin = [float(np.log(start.noise.floor / problem.floor)), start.noise.correlation]
     begin.append(start.noise.share**2 / SHARE_UNIT)
     begin += [s**2 / SCATTER_UNIT for s in scatter] + [1.0] * smooth
-    correlated = problem.most_correlated
-    # Were all bounds finite, the first step would be the whole gradient: into a corner of them.
-    bounds: list[tuple[float, float]] = [(-4.0, 4.0), (0.0, correlated), (0.0, np.inf)]
-    bounds += [(0.0, np.inf)] * (len(groups) + smooth)
-    lower, upper = np.array(bounds).T
+    lower = np.array([-4.0, *[0.0] * (len(begin) - 1)])
+    upper = np.array([4.0, problem.most_correlated, *[np.inf] * (len(begin) - 2)])
     x0 = np.clip(begin, lower, upper)
 
     def likeliest(x: Array) -> Array:
@@ -157,14 +155,13 @@ def estimate(
                 cost, slope = problem.with_slope(np.clip(z * size, lower, upper))
                 return cost, slope * size
 
-            found = minimize(
-                scaled,
-                x / size,
-                method="L-BFGS-B",
-                jac=True,
-                bounds=list(zip(lower / size, upper / size, strict=True)),
-                options=OPTIONS,
-            )
+            bounds = list(zip(lower / size, upper / size, strict=True))
+            with catch_warnings():
+                # A step to beyond a bound by round-off.
+                simplefilter("ignore", RuntimeWarning)
+                found = minimize(
+                    scaled, x / size, method="SLSQP", jac=True, bounds=bounds, options=OPTIONS
+                )
             x, before = np.clip(found.x * size, lower, upper), x
             # A gain without a step is round-off.
             if -found.fun <= FAR or np.array_equal(x, before):
