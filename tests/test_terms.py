@@ -832,3 +832,24 @@ def test_one_way_of_shearing_may_have_its_own_moment(ends, there):
             (law,) = form.laws(values)
             moments = marched(law, [0.6 * sign, 0.15 * sign, -0.6 * sign])[0]
             assert moments == pytest.approx([0.25 * sign, 0.0, 0.0], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "begins"),
+    [
+        ("elastic_moment_of_path", "path, linear", ""),  # its column says it
+        ("viscous_moment_of_angle", "angle, linear", "moment: shear rate × "),
+        ("dissipative_moment_of_path", "path, linear", "moment: friction × "),
+        ("rest_moment_of_time", "time, linear", "state of rest of the elastic moment: "),
+        ("odd_moment_of_angle", "angle, step", "moment: sign(shear angle) × "),
+        (
+            "one_way_moment_of_angle",
+            "closing below, bump",
+            "moment while the angle closes below 0: sign(shear angle) × ",
+        ),
+    ],
+)
+def test_a_formula_begins_with_what_it_is_a_factor_of(name, label, begins):
+    (term,) = (t for t in terms(RANGES, {"displacement": (-0.6, 1.0)}) if t.name == name)
+    (form,) = (v for v in term.variants if v.label == label)
+    assert form.shape.begins == begins

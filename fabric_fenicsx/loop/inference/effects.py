@@ -46,6 +46,8 @@ class Shape:
         also: name of another variable, likewise, which ``value`` takes a share of as well; empty
             of a shape over one variable.
         also_reach: its largest value.
+        begins: how its formula does, with what it is a factor of; empty where what it acts on and
+            ``y`` say that.
     """
 
     x: str
@@ -57,6 +59,7 @@ class Shape:
     points: tuple[float, ...] = ()
     also: str = ""
     also_reach: float = 1.0
+    begins: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -72,6 +72,7 @@ def discovered_terms(d: Diagnosis, first: int = 1) -> list[Discovered]:
         about = effect.acts_on.replace("_", " ") + ": "
         if table.columns[1].startswith("share_of_"):
             about = table.columns[1].removeprefix("share_of_").replace("_", " ") + " × "
+        about = variant.shape.begins or about
         name = f"discovered_{first + len(found)}"
         formula = about + (_listed(d, table) if variant.shape.points else _shortest(table))
         found.append(Discovered(name, effect, variant, d.final.values, table, formula))

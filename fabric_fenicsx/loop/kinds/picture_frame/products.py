@@ -20,6 +20,7 @@ from typing import Any
 from ....inputs.parameters import Parameter
 from ...inference.effects import Effect, Shape
 from .shapes import (
+    BEGINS,
     FORGETFUL,
     SQUARES,
     STOP_WIDTHS,
@@ -255,6 +256,7 @@ def _form(label: str, own: dict[str, Any], carried: str, like: FrameVariant | No
         own,
         also=X[own["also"]],
         also_reach=own["also_reach"],
+        begins=BEGINS.get(own["base"], ""),
     )
     laws = partial(of_a_law, own)
     return FrameVariant(label, fitted(own), shape=shape, laws=laws, carried=carried, like=like)

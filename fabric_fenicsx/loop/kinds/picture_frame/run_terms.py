@@ -19,7 +19,7 @@ from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ShapedLaw, shape_of
 from ....mechanics.laws.springs import PolynomialSpring
 from ...inference.effects import Effect, Shape, Values, valued
 from ..records import FEWEST_BEFORE, FEWEST_BY_TURNS, SHARP, between_runs
-from .shapes import X, Y, factor, fitted, over_runs, shapes
+from .shapes import BEGINS, X, Y, factor, fitted, over_runs, shapes
 from .terms import remembering
 from .variant import FrameVariant
 
@@ -50,7 +50,8 @@ def run_terms(largest: Mapping[str, float]) -> Iterator[Effect]:
         for label, coefficients, numbers in over_runs(name, last):
             own = fixed | numbers | {"coefficients": coefficients}
             value = partial(factor, own)
-            shape = Shape(X["run"], Y.get(base, "moment_N"), last, value, own)
+            begins = BEGINS.get(base, "")
+            shape = Shape(X["run"], Y.get(base, "moment_N"), last, value, own, begins=begins)
             share, stick = partial(_share, value, last), own.get("stick_angle", 0.0)
             forms.append(
                 of_the_run(label, fitted(own), base, share, stick_angle=stick, shape=shape)
@@ -105,7 +106,8 @@ def _by_the_angle(name: str, base: str, last: float, reach: float) -> Iterator[F
             every = (*curve, *numbers.values())
             parameters = tuple(n for n in every if isinstance(n, Parameter))
             value = partial(_of_angle_and_run, own)
-            shape = Shape(X["angle"], "moment_N", reach, value, own, also=X["run"], also_reach=last)
+            of = X["angle"], "moment_N", reach, value, own
+            shape = Shape(*of, also=X["run"], also_reach=last, begins=BEGINS.get(base, ""))
             yield of_the_run(
                 f"{label}, {words}", parameters, base, share, curve=curve, reach=reach, shape=shape
             )

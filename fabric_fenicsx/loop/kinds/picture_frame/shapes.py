@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shaped import GRADED, product_of, shape_of
+from ....mechanics.laws.shaped import GRADED, ONE_WAY, product_of, shape_of
 from ...inference.effects import Values, valued
 from ..records import FEWEST_BY_TURNS, SHARP, between_runs
 
 __all__ = [
+    "BEGINS",
     "FINE",
     "FORGETFUL",
     "SQUARES",
@@ -156,6 +157,27 @@ Y = {
     "travel": "travel_mm",
 }
 """What a term is a factor of, or adds, with units."""
+
+BEGINS = {
+    "rest": "state of rest of the elastic moment: ",
+    "viscous": "moment: shear rate × ",
+    "dissipative": "moment: friction × ",
+    "smooth": "moment: friction × ",
+    "flowing": "moment that flows: ",
+    "odd": "moment: sign(shear angle) × ",
+    "above": "moment where the shear angle is above 0: ",
+    "below": "moment where the shear angle is below 0: −1 × ",
+    "odd_in_rate": "moment: sign(shear rate) × ",
+    "outward": "moment while the angle opens: sign(shear angle) × ",
+    "forward": "moment while the shear angle grows: ",
+    **{
+        base: f"moment while the angle {'opens' if way > 0 else 'closes'}"
+        + ("" if above and below else f" {'above' if above else 'below'} 0")
+        + ": sign(shear angle) × "
+        for base, (way, above, below) in ONE_WAY.items()
+    },
+}
+"""How formulas begin, by the base of the law: a friction and a flow are of limit 1."""
 
 
 def fitted(numbers: Mapping[str, Any]) -> tuple[Parameter, ...]:

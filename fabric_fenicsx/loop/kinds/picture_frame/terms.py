@@ -19,6 +19,7 @@ from ...inference.effects import Effect, Shape, Values, valued
 from ..records import FEWEST_BEFORE
 from .rig_terms import rig_terms
 from .shapes import (
+    BEGINS,
     FINE,
     FORGETFUL,
     STRUCTURE,
@@ -393,7 +394,14 @@ def _law_form(
     return FrameVariant(
         label,
         fitted(own),
-        shape=Shape(X[variable], Y.get(base, "moment_N"), own["reach"], partial(factor, own), own),
+        shape=Shape(
+            X[variable],
+            Y.get(base, "moment_N"),
+            own["reach"],
+            partial(factor, own),
+            own,
+            begins=BEGINS.get(base, ""),
+        ),
         laws=partial(of_a_law, own),
         carried=carried,
         like=like,
