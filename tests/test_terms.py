@@ -22,7 +22,8 @@ from fabric_fenicsx.loop.report.discovered import Discovered, _shortest
 from fabric_fenicsx.loop.report.effect_file import effect_file
 from fabric_fenicsx.mechanics.laws.lagging import Lagging
 from fabric_fenicsx.mechanics.laws.law import Crossing, CrossingLaw
-from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw, shape_of
+from fabric_fenicsx.mechanics.laws.shaped import ShapedLaw
+from fabric_fenicsx.mechanics.laws.shapes import shape_of
 from fabric_fenicsx.rigs.cases import CrossoverKeys
 
 STEP = 0.5

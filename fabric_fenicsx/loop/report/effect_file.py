@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ... import __version__
-from ...mechanics.laws.shaped import OF_ELASTIC, shape_of
+from ...mechanics.laws.shaped import OF_ELASTIC
+from ...mechanics.laws.shapes import shape_of
 from ..inference.effects import valued
 from .discovered import Discovered
 

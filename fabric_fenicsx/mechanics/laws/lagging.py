@@ -8,8 +8,9 @@ from typing import Any, Literal
 from ufl import max_value, min_value
 
 from ...inputs.groups import NotNegative, Positive
-from .law import Crossing, CrossingLaw, in_degrees, number, per_area, signed, size_of
-from .shaped import Kind, each, kept, shape_of
+from .law import Crossing, CrossingLaw, each, in_degrees, number, per_area, signed, size_of
+from .shapes import Kind, shape_of
+from .variables import kept
 
 __all__ = ["Lagging"]
 

@@ -13,7 +13,7 @@ are odd: a crossing does not know which way it is sheared.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, ClassVar, Self
 
@@ -30,6 +30,7 @@ __all__ = [
     "Number",
     "Times",
     "asinh",
+    "each",
     "in_degrees",
     "number",
     "per_area",
@@ -263,6 +264,12 @@ class CrossingLaw(Declared):
             return stored, None
         before = self.energy(at.gamma_n, {name: at.past(name) for name in memory}, at.number)
         return stored, moment * at.change - (stored - before)
+
+
+def each(at: Crossing, numbers: Sequence[Any]) -> list[Any]:
+    """Constants of the form, one for each of some numbers."""
+    known = at.number(tuple(numbers)) if numbers else ()
+    return [known[k] for k in range(len(numbers))]
 
 
 def signed(x: Any, size: Any) -> Any:

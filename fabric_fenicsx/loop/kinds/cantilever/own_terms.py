@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shaped import shape_of
+from ....mechanics.laws.shapes import shape_of
 from ...inference.effects import Effect, Shape, Values, of_run, of_specimen
 from .term import X, Y, strip_effect, turned
 from .variant import StripVariant

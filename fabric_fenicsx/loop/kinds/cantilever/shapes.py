@@ -11,7 +11,7 @@ import numpy as np
 from ufl import cos, exp
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shaped import shape_of
+from ....mechanics.laws.shapes import shape_of
 from ...inference.effects import Values, valued
 from ..records import FEWEST_BY_TURNS, SHARP, between_runs
 

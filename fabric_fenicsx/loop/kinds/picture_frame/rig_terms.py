@@ -11,7 +11,8 @@ from ufl import conditional, exp, gt, max_value, min_value
 
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.law import size_of
-from ....mechanics.laws.shaped import recent, shape_of
+from ....mechanics.laws.shapes import shape_of
+from ....mechanics.laws.variables import recent
 from ...inference.effects import Effect, Shape, Values, valued
 from .shapes import (
     Drawn,

@@ -15,7 +15,8 @@ from ufl import min_value
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.dashpots import LinearDashpot
 from ....mechanics.laws.law import CrossingLaw
-from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ShapedLaw, shape_of
+from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ShapedLaw
+from ....mechanics.laws.shapes import shape_of
 from ....mechanics.laws.springs import PolynomialSpring
 from ...inference.effects import Effect, Shape, Values, valued
 from ..records import FEWEST_BEFORE, FEWEST_BY_TURNS, SHARP, between_runs

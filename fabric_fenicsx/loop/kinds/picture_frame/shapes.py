@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shaped import GRADED, ONE_WAY, product_of, shape_of
+from ....mechanics.laws.shaped import ONE_WAY
+from ....mechanics.laws.shapes import GRADED, product_of, shape_of
 from ...inference.effects import Values, valued
 from ..records import FEWEST_BY_TURNS, SHARP, between_runs
 
