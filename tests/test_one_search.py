@@ -72,6 +72,22 @@ def test_forms_are_looked_at_again_when_noise_is_known():
     assert models.variances is loud, "which other fits are compared by"
 
 
+def test_a_model_is_weighed_by_what_its_fit_has_got_to(monkeypatch):
+    """A fit that does not take the step that is left to it, as before a kink, is none with it."""
+    effect = linear_effect("bend")
+    test = made({"bend": lambda t: t**2}, lambda t: 0.5 * t**2, [effect])
+    models, start = Models(test, [effect]), {"a": 10.0, "b": 2.0, "bend": 0.3}
+    found = fit(test, effect.variants, start, test.readings.fit, Variances(NOISE))
+    there = models.weighed([found])[0]
+    stuck = replace(found, residual=found.residual - 0.05 * found.slopes[:, 2])
+    monkeypatch.setattr("fabric_fenicsx.loop.inference.models.fit", lambda *args, **more: stuck)
+    at_first = models.weighed([stuck])[0]
+    assert at_first.criterion == pytest.approx(there.criterion, abs=1.0), "to first order it is"
+    last = models.refined(at_first)
+    assert last.criterion > there.criterion + 100.0
+    assert models.refined(last).criterion == pytest.approx(last.criterion)
+
+
 def of_two_bends():
     """A search for a kink, where a wave does nearly as well, that has been made."""
     columns = {"kink": lambda t: np.maximum(t - 0.6, 0.0), "wave": lambda t: t**3}

@@ -73,6 +73,22 @@ def dense(at, noise, taus, omega, S):
     return likelihood + np.linalg.slogdet(X.T @ P @ X)[1], likelihood
 
 
+def test_what_a_step_of_the_common_parameters_would_take_off():
+    """Of the weighted sum of squares, against dense matrices; nothing where there is no such step."""
+    at = example()
+    found = estimate(at, START)
+    V = covariance(at.readings, at.rows, found.variances.noise)
+    for group, tau in found.variances.scatter.items():
+        V = V + tau**2 * at.specimens[group] @ at.specimens[group].T
+    P, X = np.linalg.inv(V), at.common
+    by = X.T @ P @ at.residual
+    step = np.linalg.solve(X.T @ P @ X, by)
+    assert found.unattained == pytest.approx(by @ step, rel=1e-6)
+    there = estimate(replace(at, residual=at.residual - X @ step), found.variances)
+    assert there.restricted == pytest.approx(found.restricted, abs=NEARLY)
+    assert there.unattained < 1.0 < found.unattained
+
+
 def prior(noise, taus, at, usual, given):
     """−2 log of what is usual."""
     found = np.sum((np.array(taus) / usual) ** 2) + (noise.share / CRITERIA.usual_share) ** 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -231,8 +232,8 @@ class Models:
                     self.experiment.settle(model.fit.variants, model.fit.values)
                 model = self._again(model, variances, CRITERIA.evaluations)
             except SolveError:
-                return model
-        return model
+                break
+        return self._as_attained(model)
 
     def _again(self, model: Model, variances: Variances, evaluations: int) -> Model:
         """A model fitted again from where it is, with other variances."""
@@ -260,7 +261,19 @@ class Models:
             return model
         # What was chosen is reported, and not a fit that went astray on the way.
         left, before = (one.fit.rms(one.fit.used) for one in (last, model))
-        return last if left <= CRITERIA.scatter * before else model
+        return self._as_attained(last if left <= CRITERIA.scatter * before else model)
+
+    def _as_attained(self, model: Model) -> Model:
+        """A model that was fitted with its own variances, by what that fit leaves.
+
+        Likelihoods are those at the end of a step to first order, which then is a small one; but
+        where the readings have a kink or a jump there may be no such step.
+        """
+        missed = model.estimate.unattained
+        if missed < CRITERIA.decisive:
+            return model
+        attained = model.estimate.likelihood + self.judge.cost(model.fit, model.effects) + missed
+        return replace(model, criterion=attained)
 
     def best_refined(self, models: list[Model]) -> list[Model]:
         """Models, the best first; the best of each set of effects was fitted again.

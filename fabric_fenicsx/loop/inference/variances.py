@@ -104,6 +104,8 @@ class Estimate:
         restricted: −2 log restricted likelihood, priors included.
         likelihood: −2 log likelihood, priors included; see ``estimate``.
         white: what is left, white, with the specimens' deviations but no smooth line, (n,).
+        unattained: what of the weighted sum of squares the likelihoods leave out, as a step of the
+            common parameters would to first order that the fit has not taken.
     """
 
     variances: Variances
@@ -111,6 +113,7 @@ class Estimate:
     restricted: float
     likelihood: float
     white: Array
+    unattained: float
 
 
 def estimate(
@@ -193,7 +196,8 @@ def estimate(
         likelihood = min(likelihood, problem.cost(likeliest(alike(found)))[1])
     noise, taus, omega = problem.split(found)
     variances = Variances(noise, dict(zip(groups, taus.tolist(), strict=True)))
-    return Estimate(variances, omega, restricted, likelihood, problem.white(found))
+    white, unattained = problem.white(found), problem.unattained(found)
+    return Estimate(variances, omega, restricted, likelihood, white, unattained)
 
 
 def averaged(
@@ -415,6 +419,16 @@ class _Problem:
                 *[of_omega * floor**2] * self._smooth,
             ]
         )
+
+    def unattained(self, x: Array) -> float:
+        """What a step of the common parameters takes off the weighted sum of squares."""
+        found, p = self._solved(x), self._common.shape[1]
+        of_all, of_random = found.by, found.by[p:]
+        gains = (
+            of_all @ np.linalg.solve(found.matrix, of_all),
+            of_random @ np.linalg.solve(found.matrix[p:, p:], of_random),
+        )
+        return float(gains[0] - gains[1])
 
     def white(self, x: Array) -> Array:
         """Residual that is left with the specimens' deviations, but without smooth lines, white."""
