@@ -74,7 +74,7 @@ def dense(at, noise, taus, omega, S):
 
 
 def test_what_a_step_of_the_common_parameters_would_take_off():
-    """Of the weighted sum of squares, against dense matrices; nothing where there is no such step."""
+    """Of the weighted sum of squares, against dense matrices; nothing at its end."""
     at = example()
     found = estimate(at, START)
     V = covariance(at.readings, at.rows, found.variances.noise)
