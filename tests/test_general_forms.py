@@ -301,6 +301,8 @@ def test_signs_of_general_forms_are_those_of_physics():
     [
         ("cantilever", "bending_moment_of_curvature", "nonlinear_bending"),
         ("cantilever", "bending_moment_of_arc_length", None),
+        ("cantilever", "rest_curvature_of_arc_length", "residual_curvature"),
+        ("cantilever", "load_of_arc_length", None),
         ("picture_frame", "even_moment_of_angle", "tension_coupling"),
         ("picture_frame", "odd_in_rate_moment_of_rate", "rate_hardening"),
         ("picture_frame", "dissipative_moment_of_direction", "crossover_friction"),

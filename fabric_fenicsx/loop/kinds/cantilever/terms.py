@@ -216,7 +216,9 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
                 for label, parameters, g in _drawn_along(name, end, constant=constant, most=most)
             ]
             words = f"{about} that varies along the strip"
-            yield strip_effect(name, words, acts_on, depends_on, forms)
+            # However it does, a strip that is not flat unloaded has one of these.
+            whatever = "residual_curvature" if constant else ""
+            yield strip_effect(name, words, acts_on, depends_on, forms, in_general=whatever)
         name = f"{acts_on}_of_length"
         forms = [
             form_of_strip(drawn, acts_on, unit, "length", longest)
