@@ -61,17 +61,12 @@ class Whitener:
     def __call__(self, errors: Array) -> Array:
         """White ones of the same shape, (n,) or (n, k)."""
         shape = (-1,) + (1,) * (errors.ndim - 1)
-        w = self.independent(errors / self._sigma.reshape(shape))
-        if self._along is not None:
-            w = w - self._along @ (self._taken.reshape(shape) * (self._along.T @ w))
-        return w
-
-    def independent(self, u: Array) -> Array:
-        """Errors over their sigma without what they have in common with their neighbours."""
-        shape = (-1,) + (1,) * (u.ndim - 1)
+        u = errors / self._sigma.reshape(shape)
         w = u.copy()
         w[1:] -= self._neighbour[1:].reshape(shape) * u[:-1]
         w /= self._left.reshape(shape)
+        if self._along is not None:
+            w = w - self._along @ (self._taken.reshape(shape) * (self._along.T @ w))
         return w
 
 

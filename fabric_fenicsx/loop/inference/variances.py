@@ -299,8 +299,9 @@ class _Problem:
         errors = np.zeros((len(at.residual), 0)) if error is None else error[at.rows]
         self._fixed = np.ones(errors.shape[1])
         parts = [self._common, *self._blocks, self._lines, errors, at.residual[:, None]]
-        first = self._common.shape[1] + sum(block.shape[1] for block in self._blocks)
-        among = slice(first, first + self._lines.shape[1])
+        #: Where the columns of θ end, then those of each group, and the lines.
+        self._ends = np.cumsum([part.shape[1] for part in parts[:-2]])
+        among = slice(*self._ends[-2:])
         self._columns = Columns(at.readings, at.rows, np.concatenate(parts, axis=1), among)
         self._known: White | None = None
         several = len(np.unique(at.readings.run[at.rows])) > 1
@@ -335,11 +336,10 @@ class _Problem:
         """
         found = self._solved(x)
         noise, white, s, floor = found.noise, found.white, found.scale, found.noise.floor
-        G, p, n = white.products, self._common.shape[1], len(self._at.residual)
+        G, n = white.products, len(self._at.residual)
         Y = G[:-1, :-1] * s / floor
         P = G[:-1, :-1] / floor**2 - Y @ np.linalg.inv(found.matrix) @ Y.T
-        ends = np.cumsum([p, *(b.shape[1] for b in self._blocks), self._lines.shape[1]])
-        own = np.array([float(np.sum(P[i:j, i:j] ** 2)) for i, j in pairwise(ends)])
+        own = np.array([float(np.sum(P[i:j, i:j] ** 2)) for i, j in pairwise(self._ends)])
         of_taus, of_omega = own[:-1], own[-1:] * floor**4
         share = (SHARE_UNIT / floor**2) * 2.0 * white.growth
         along = noise.correlation
@@ -393,9 +393,8 @@ class _Problem:
         Y = G[:-1, :-1] * s / floor
         of_columns = np.diag(G)[:-1] / floor**2 - np.einsum("ij,ij->i", Y @ inverse, Y)
         of_columns -= (G[:-1, -1] / floor**2 - Y @ u) ** 2
-        ends = np.cumsum([p, *(b.shape[1] for b in self._blocks), self._lines.shape[1]])
-        *of_taus, of_omega = (float(of_columns[i:j].sum()) for i, j in pairwise(ends))
-        fixed = float(of_columns[ends[-1] :].sum())
+        *of_taus, of_omega = (float(of_columns[i:j].sum()) for i, j in pairwise(self._ends))
+        fixed = float(of_columns[self._ends[-1] :].sum())
         taken = 0 if self.of else p
         of_floor = 2.0 * (n - taken - found.chi - fixed - np.dot(found.taus**2, of_taus))
         H = np.empty_like(G)
@@ -443,7 +442,7 @@ class _Problem:
         q = A.shape[1] - p
         stacked = np.concatenate([A, np.eye(p + q)[p:]])
         solution = np.linalg.lstsq(stacked, np.concatenate([y, np.zeros(q)]), rcond=None)[0]
-        kept = p + sum(block.shape[1] for block in self._blocks)
+        kept = self._ends[-2]
         return np.asarray(y - A[:, :kept] @ solution[:kept])
 
     def _scales(self, taus: Array, omega: float) -> Array:

@@ -13,7 +13,7 @@ from .law import Crossing, CrossingLaw, each, in_degrees, number, per_area, sign
 from .shapes import LEAST, Course, Kind, product_of, shape_of
 from .variables import AT_HAND, VARIABLES, Also, Variable, at_rest, way
 
-__all__ = ["FRICTION", "OF_ELASTIC", "ONE_WAY", "ShapedLaw"]
+__all__ = ["FRICTION", "OF_ELASTIC", "ONE_SIDED", "ONE_WAY", "ShapedLaw"]
 
 Base = Literal[
     "elastic",
@@ -38,6 +38,9 @@ Base = Literal[
     "flowing",
 ]
 
+
+ONE_SIDED = ("above", "below")
+"""Bases of one side of γ = 0."""
 
 SIDES = {"": (1, 1), " above": (1, 0), " below": (0, 1)}
 """Whether something is there where γ > 0, and where γ < 0, by what its base is called."""

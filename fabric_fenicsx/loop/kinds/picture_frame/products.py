@@ -18,19 +18,19 @@ from types import MappingProxyType
 from typing import Any
 
 from ....inputs.parameters import Parameter
-from ...inference.effects import Effect, Shape
+from ....mechanics.laws.shaped import ONE_SIDED
+from ...inference.effects import Effect
 from .shapes import (
-    BEGINS,
     FORGETFUL,
     SQUARES,
     STOP_WIDTHS,
     STOPS,
     Ends,
     X,
-    Y,
     bumps,
     courses,
     fitted,
+    moment_shape,
     moving,
     of_powers,
     product,
@@ -105,18 +105,19 @@ def products(largest: Mapping[str, float], ends: Ends = MappingProxyType({})) ->
         largest: sizes of the variables; see terms.ranges_of.
         ends: between which shares of these the signed ones are.
     """
-    sides = ("above", "below") if both_ways(ends) else ()
+    sides = ONE_SIDED if both_ways(ends) else ()
     found = []
     for kind in KINDS:
         for by, variables in as_reported(kind.by).items():
             name = f"{kind.base}_moment_of_{kind.also}_and_{by}"
             forms = [form for v in variables for form in _forms(kind, name, v, largest)]
-            forms += [form for w in variables for form in _turned(kind, name, w, largest)]
+            histories = [variable for variable in variables if variable in HISTORIES]
+            forms += [form for w in histories for form in _turned(kind, name, w, largest)]
             if kind.base == "odd":
                 # What only one way of shearing has.
                 forms += [
                     form
-                    for w in variables
+                    for w in histories
                     for base in sides
                     for form in _in_courses(replace(kind, base=base), name, w, largest)
                 ]
@@ -165,7 +166,7 @@ def _turned(
     kind: _Kind, name: str, history: str, largest: Mapping[str, float]
 ) -> Iterator[FrameVariant]:
     """Forms in which a shape over the angle goes by powers of a history, or moves with it."""
-    if not kind.turned or history not in HISTORIES:
+    if not kind.turned:
         return
     fixed, words = _at_the_angle(kind, name, history, largest), history.replace("_", " ")
     for powers in kind.turned:
@@ -198,8 +199,6 @@ def _in_courses(
     kind: _Kind, name: str, history: str, largest: Mapping[str, float]
 ) -> Iterator[FrameVariant]:
     """Forms of what is at an angle, or begins at one, in the course of a history."""
-    if history not in HISTORIES:
-        return
     fixed, words = _at_the_angle(kind, name, history, largest), history.replace("_", " ")
     for label, one, numbers in (*bumps(name), *shapes(name, 2)):
         if label in AT_AN_ANGLE:
@@ -231,7 +230,7 @@ def _in_a_course(
     about = {**numbers, "place": place, "width": width}
     about |= {"powers": COMES_OR_GOES, "coefficients": coefficients}
     for said, course in courses(name):
-        where = kind.base if kind.base in ("above", "below") else kind.also
+        where = kind.base if kind.base in ONE_SIDED else kind.also
         yield _form(f"{where}, {label} {said} with the {words}", about | course, "", None)
 
 
@@ -248,15 +247,14 @@ def _shapes(
 
 
 def _form(label: str, own: dict[str, Any], carried: str, like: FrameVariant | None) -> FrameVariant:
-    shape = Shape(
-        X[own["variable"]],
-        Y.get(own["base"], "moment_N"),
+    shape = moment_shape(
+        own["base"],
+        own["variable"],
         own["reach"],
         partial(product, own),
         own,
         also=X[own["also"]],
         also_reach=own["also_reach"],
-        begins=BEGINS.get(own["base"], ""),
     )
     laws = partial(of_a_law, own)
     return FrameVariant(label, fitted(own), shape=shape, laws=laws, carried=carried, like=like)

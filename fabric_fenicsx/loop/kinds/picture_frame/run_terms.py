@@ -20,7 +20,7 @@ from ....mechanics.laws.shapes import shape_of
 from ....mechanics.laws.springs import PolynomialSpring
 from ...inference.effects import Effect, Shape, Values, valued
 from ..records import FEWEST_BEFORE, FEWEST_BY_TURNS, SHARP, between_runs
-from .shapes import BEGINS, X, Y, factor, fitted, over_runs, shapes
+from .shapes import X, factor, fitted, moment_shape, over_runs, shapes
 from .terms import remembering
 from .variant import FrameVariant
 
@@ -51,8 +51,7 @@ def run_terms(largest: Mapping[str, float]) -> Iterator[Effect]:
         for label, coefficients, numbers in over_runs(name, last):
             own = fixed | numbers | {"coefficients": coefficients}
             value = partial(factor, own)
-            begins = BEGINS.get(base, "")
-            shape = Shape(X["run"], Y.get(base, "moment_N"), last, value, own, begins=begins)
+            shape = moment_shape(base, "run", last, value, own)
             share, stick = partial(_share, value, last), own.get("stick_angle", 0.0)
             forms.append(
                 of_the_run(label, fitted(own), base, share, stick_angle=stick, shape=shape)
@@ -107,8 +106,8 @@ def _by_the_angle(name: str, base: str, last: float, reach: float) -> Iterator[F
             every = (*curve, *numbers.values())
             parameters = tuple(n for n in every if isinstance(n, Parameter))
             value = partial(_of_angle_and_run, own)
-            of = X["angle"], "moment_N", reach, value, own
-            shape = Shape(*of, also=X["run"], also_reach=last, begins=BEGINS.get(base, ""))
+            of = base, "angle", reach, value, own
+            shape = moment_shape(*of, also=X["run"], also_reach=last)
             yield of_the_run(
                 f"{label}, {words}", parameters, base, share, curve=curve, reach=reach, shape=shape
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,11 +11,10 @@ import numpy as np
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import ONE_WAY
 from ....mechanics.laws.shapes import GRADED, product_of, shape_of
-from ...inference.effects import Values, valued
+from ...inference.effects import Shape, Values, valued
 from ..records import FEWEST_BY_TURNS, SHARP, between_runs
 
 __all__ = [
-    "BEGINS",
     "FINE",
     "FORGETFUL",
     "SQUARES",
@@ -31,6 +30,7 @@ __all__ = [
     "factor",
     "fitted",
     "memory_of",
+    "moment_shape",
     "moving",
     "of_powers",
     "over",
@@ -179,6 +179,19 @@ BEGINS = {
     },
 }
 """How formulas begin, by the base of the law: a friction and a flow are of limit 1."""
+
+
+def moment_shape(
+    base: str,
+    variable: str,
+    reach: float,
+    value: Callable[..., Any],
+    fixed: Mapping[str, Any],
+    **also: Any,
+) -> Shape:
+    """Of a moment with a base, by a variable; for the others see Shape."""
+    y, begins = Y.get(base, "moment_N"), BEGINS.get(base, "")
+    return Shape(X[variable], y, reach, value, fixed, begins=begins, **also)
 
 
 def fitted(numbers: Mapping[str, Any]) -> tuple[Parameter, ...]:

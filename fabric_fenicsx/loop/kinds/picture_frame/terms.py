@@ -14,23 +14,21 @@ from typing import Any
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.lagging import Lagging
 from ....mechanics.laws.law import CrossingLaw
-from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ONE_WAY, ShapedLaw
-from ...inference.effects import Effect, Shape, Values, valued
+from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ONE_SIDED, ONE_WAY, ShapedLaw
+from ...inference.effects import Effect, Values, valued
 from ..records import FEWEST_BEFORE
 from .rig_terms import rig_terms
 from .shapes import (
-    BEGINS,
     FINE,
     FORGETFUL,
     STRUCTURE,
     Drawn,
     Ends,
-    X,
-    Y,
     bumps,
     factor,
     fitted,
     memory_of,
+    moment_shape,
     pulses,
     remembered_since,
     shapes,
@@ -190,7 +188,7 @@ def _of_one_way(largest: Mapping[str, float], both: bool) -> Iterator[Effect]:
     # A line and a cube are the baseline's and an even moment's.
     chosen = ("2 coefficients", "step", "saturation", "corner")
     kinds: tuple[tuple[str, Iterable[str], tuple[str, ...]], ...] = (
-        ("one_sided_moment_of_angle", ("above", "below") if both else (), ()),
+        ("one_sided_moment_of_angle", ONE_SIDED if both else (), ()),
         ("one_way_moment_of_angle", ONE_WAY if both else ("opening", "closing"), ("direction",)),
     )
     for name, bases, also in kinds:
@@ -394,14 +392,7 @@ def _law_form(
     return FrameVariant(
         label,
         fitted(own),
-        shape=Shape(
-            X[variable],
-            Y.get(base, "moment_N"),
-            own["reach"],
-            partial(factor, own),
-            own,
-            begins=BEGINS.get(base, ""),
-        ),
+        shape=moment_shape(base, variable, own["reach"], partial(factor, own), own),
         laws=partial(of_a_law, own),
         carried=carried,
         like=like,
