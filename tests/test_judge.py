@@ -184,6 +184,29 @@ def test_a_misfit_that_held_out_runs_contradict_is_not_noise(held, verdict):
     assert [e.name for e in found.effects] == ["rough"] * (held > 0.0)
 
 
+def test_where_held_out_runs_contradict_one_term_beside_slow_noise_two_are_tried():
+    """Two rough lines, of which the second is against the first in the run that is held out."""
+    rng = np.random.default_rng(6)
+    t = np.tile(np.linspace(0.0, 1.0, 120), 4)
+    run = np.repeat(np.arange(4), 120)
+    rough, other = lfilter([1.0], [1.0, -0.93], rng.normal(size=(2, 120)))
+    columns = {"a": np.ones_like(t), "b": t, "rough": np.tile(rough, 4)}
+    columns["other"] = np.tile(other, 4) - np.where(run == 3, 3.0 * columns["rough"], 0.0)
+    columns["kink"] = np.maximum(t - 0.9, 0.0)
+    seen = 0.2 * columns["rough"] + 0.15 * columns["other"]
+    observed = 100.0 + 2.0 * t + seen + 0.03 * rng.normal(size=len(t))
+    test = Linear(readings(observed, run=run, holdout=(3,)), columns, ("a", "b"))
+
+    test.effects = [linear_effect("kink")]
+    test.terms = [linear_effect("rough", acts_on="moment")]
+    test.terms_are_rivals = test.each_its_own_way = False
+    assert diagnose_test(test).verdict == "unexplained"
+    test.terms.append(linear_effect("other", acts_on="moment"))
+    found = diagnose_test(test)
+    assert found.verdict == "effect_discovered"
+    assert {e.name for e in found.effects} == {"rough", "other"}
+
+
 def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None):
     """A line with a bend in it, or a round one: an effect is the bend, a term the round one.
 

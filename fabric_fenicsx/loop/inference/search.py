@@ -135,18 +135,18 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
             return _in_their_place(search, further, single, gain)
         if len(found.effects) > 1 and abs(gain) < CRITERIA.decisive:
             _rival_of_all(search, final, single)
+    nearest = min((m.criterion for m in single.singles), default=float("inf"))
+    if not single.accounted and nearest < final.criterion - CRITERIA.decisive:
+        # What is beaten so is not it, whether or not what beats it is all that there is.
+        further.most = None
+        return _beside(further.run(), found)
     if not chosen.effects:
         preferred = single.chosen
         if single.accounted and preferred is not None and preferred.effects:
             if final.criterion - preferred.criterion > CRITERIA.decisive:
                 # Held-out runs contradict it, which does not make a misfit noise.
-                return _beside(other, found)
+                return _beside(_or_several(single, further, preferred.criterion), found)
     else:
-        nearest = min((m.criterion for m in single.singles), default=float("inf"))
-        if not single.accounted and nearest < final.criterion - CRITERIA.decisive:
-            # What is beaten so is not it, whether or not what beats it is all that there is.
-            further.most = None
-            return _beside(further.run(), found)
         doubted = len(chosen.effects) > 1 and search.doubtful_noise
         doubted |= further.may_be_one_more(final)
         if doubted or search.judge.slow_noise(final):
@@ -168,11 +168,17 @@ def _in_their_place(search: Search, further: Search, single: Search, gain: float
             names_of += [effect.name for effect in found.effects]
     elif len(found.effects) == 1:
         _name(single, other.effects[0], search, found.effects[0])
+    return _beside(_or_several(single, further, other.criterion_after), found)
+
+
+def _or_several(single: Search, further: Search, criterion: float) -> Diagnosis:
+    """What a search for one term has found; or several, if it may not be all and they do better."""
+    assert single.found is not None
     if single.doubtful_noise or single.may_be_more:
-        several = _several(further, other.criterion_after)
+        several = _several(further, criterion)
         if several is not None:
-            return _beside(several, found)
-    return _beside(other, found)
+            return several
+    return single.found
 
 
 def _several(further: Search, criterion: float) -> Diagnosis | None:
