@@ -105,7 +105,8 @@ class Estimate:
         likelihood: −2 log likelihood, priors included; see ``estimate``.
         white: what is left, white, with the specimens' deviations but no smooth line, (n,).
         unattained: what of the weighted sum of squares the likelihoods leave out, as a step of the
-            common parameters would to first order that the fit has not taken.
+            common parameters would to first order that the fit has not taken. Nothing at the end
+            of a fit, with the components that it was made with: with others it is not at its end.
     """
 
     variances: Variances
@@ -129,7 +130,7 @@ def estimate(
 
     Args:
         at: a fit.
-        start: where to begin.
+        start: the components that it was made with, where to begin.
         given: one sigma of a reading as it was stated; it may be wrong, but not by much.
         smooth: whether a smooth line through each run is allowed for, so that what a model misses
             does not count as noise.
@@ -196,8 +197,11 @@ def estimate(
         likelihood = min(likelihood, problem.cost(likeliest(alike(found)))[1])
     noise, taus, omega = problem.split(found)
     variances = Variances(noise, dict(zip(groups, taus.tolist(), strict=True)))
-    white, unattained = problem.white(found), problem.unattained(found)
-    return Estimate(variances, omega, restricted, likelihood, white, unattained)
+    x0[3:] = [*(start.scatter.get(g, 0.0) ** 2 / SCATTER_UNIT for g in groups), *[0.0] * smooth]
+    of_a_reading = (one.typical(at.readings, at.rows) for one in (start.noise, noise))
+    unattained = problem.unattained(x0) * np.divide(*of_a_reading) ** 2
+    white = problem.white(found)
+    return Estimate(variances, omega, restricted, likelihood, white, float(unattained))
 
 
 def averaged(
