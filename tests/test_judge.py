@@ -121,6 +121,23 @@ def test_noise_of_far_more_than_was_stated_accounts_for_nothing():
     assert judge.fits(model, model)
 
 
+@pytest.mark.parametrize(("error", "foretold"), [(0.0, False), (1.0, False), (3.0, True)])
+def test_what_is_less_than_a_models_own_error_is_foretold(error, foretold):
+    """A wave in the held-out run that is of another shape than the others which the model knows."""
+    t = np.tile(np.linspace(0.0, 1.0, 60), 2)
+    run = np.repeat([0, 1], 60)
+    wave = np.where(run == 1, 2.0 * SIGMA * np.sin(7.0 * np.pi * t), 0.0)
+    observed = 2.0 + t + wave + SIGMA * np.random.default_rng(3).normal(size=120)
+    known = error * SIGMA * np.sqrt(2.0) * np.sin(4.0 * np.pi * t)[:, None] if error else None
+    data = readings(observed, run=run, holdout=(1,), specimen=np.zeros_like(run), model_error=known)
+    test = Linear(data, {"a": np.ones_like(t), "b": t}, ("a", "b"), noise=SIGMA)
+    judge = Judge(test, [])
+    model = judge.weighed(fit(test, (), {"a": 2.0, "b": 1.0}, data.fit, NOISE), ())
+    assert judge.holdout(model.fit) == pytest.approx(np.sqrt(3.0) * SIGMA, rel=0.15)
+    assert judge.misfit(model).noise == pytest.approx(np.hypot(1.0, error) * SIGMA, rel=0.01)
+    assert judge.foretells(model) is foretold
+
+
 @pytest.mark.parametrize(
     ("correlation", "named", "term", "alone"),
     [(0.1, 0, 0, 0), (0.3, 1, 0, 0), (0.7, 1, 1, 0), (0.9, 1, 1, 1)],

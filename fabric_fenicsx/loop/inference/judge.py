@@ -346,7 +346,10 @@ class Judge:
         allowed = CRITERIA.roughly if roughly else CRITERIA.scatter
         # Held-out readings are compared with a noise that few others may be all that is known of.
         limit = max(allowed, self._by_chance(model, count, of_others=bool(out.any())))
-        return bool(error * noise <= limit * self.misfit(model).reading)
+        found = self.misfit(model)
+        # A model's own error is known by a few others, and need not be of their shape.
+        by_itself = self._readings.model_error is not None and self.holdout(model.fit) < found.noise
+        return by_itself or bool(error * noise <= limit * found.reading)
 
     def _known_of(self, model: Model) -> list[str]:
         """Parameters of terms without a formula, which have to be known where they foretell."""
