@@ -198,10 +198,9 @@ def estimate(
     noise, taus, omega = problem.split(found)
     variances = Variances(noise, dict(zip(groups, taus.tolist(), strict=True)))
     x0[3:] = [*(start.scatter.get(g, 0.0) ** 2 / SCATTER_UNIT for g in groups), *[0.0] * smooth]
-    of_a_reading = (one.typical(at.readings, at.rows) for one in (start.noise, noise))
-    unattained = problem.unattained(x0) * np.divide(*of_a_reading) ** 2
-    white = problem.white(found)
-    return Estimate(variances, omega, restricted, likelihood, white, float(unattained))
+    sizes = [one.typical(at.readings, at.rows) for one in (start.noise, noise)]
+    unattained = problem.unattained(x0) * (sizes[0] / sizes[1]) ** 2
+    return Estimate(variances, omega, restricted, likelihood, problem.white(found), unattained)
 
 
 def averaged(
