@@ -13,8 +13,8 @@ from .curve import Curve
 from .effects import Effect
 from .experiment import Experiment
 from .fitting import Fit
-from .judge import Laboratory
 from .noise import Noise, Whiteness
+from .validation import Laboratory
 
 __all__ = ["Beside", "Candidate", "Diagnosis", "Joined", "Round", "Verdict"]
 

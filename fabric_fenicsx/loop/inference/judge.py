@@ -25,7 +25,7 @@ from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitting import Fit, groups_of, linearised
 from .noise import Noise, Whiteness, missed_readings, outliers, whiteness
-from .validation import CrossValidation, cross_validated, fitted_without, parts_by, stretches
+from .validation import CrossValidation, cross_validated, parts_by, stretches
 from .variances import (
     Estimate,
     Linearised,
@@ -35,7 +35,7 @@ from .variances import (
     estimate,
 )
 
-__all__ = ["Judge", "Laboratory", "Misfit", "Model"]
+__all__ = ["Judge", "Misfit", "Model"]
 
 Flags = npt.NDArray[np.bool_]
 
@@ -71,25 +71,6 @@ class Misfit:
     reading: float
     noise: float
     whiteness: Whiteness
-
-
-@dataclass(frozen=True, slots=True)
-class Laboratory:
-    """Readings of one folder, foretold from other folders.
-
-    Attributes:
-        folder: its number.
-        own: root mean square error with its own readings among those that are fitted.
-        foretold: error of what the others say of it.
-        expected: what they expect it to be, as laboratories and specimens differ.
-        size: root mean square of the readings.
-    """
-
-    folder: int
-    own: float
-    foretold: float
-    expected: float
-    size: float
 
 
 class Judge:
@@ -461,21 +442,6 @@ class Judge:
             parts = stretches(self._readings, model.used)
             self._validated[key] = cross_validated(self.experiment, model, parts)
         return self._validated[key]
-
-    def laboratories(self, model: Fit, noise: float) -> list[Laboratory]:
-        """What is said of each folder's fitted readings by those of the others; none of one."""
-        found = []
-        folder = self._readings.folder
-        parts = parts_by(folder, model.used)
-        for part in parts if len(parts) > 1 else ():
-            other = fitted_without(self.experiment, model, part)
-            error = expected = float("nan")
-            if other is not None:
-                error = other.rms(part)
-                expected = float(np.hypot(noise, other.prediction_std(part)))
-            size = float(np.sqrt(np.mean(self._readings.observed[part] ** 2)))
-            found.append(Laboratory(int(folder[part][0]), model.rms(part), error, expected, size))
-        return found
 
     def _by_chance(self, model: Model, count: int, *, of_others: bool = False) -> float:
         """Scatter over noise that is exceeded by chance once in a thousand.

@@ -30,6 +30,7 @@ from .noise import quantum
 from .notes import errors_beside, noise_source, notes_of
 from .rivals import InPlace, in_place, pairs_of, rivals_of
 from .screen import Screen, Signatures
+from .validation import laboratories
 from .variances import Variances
 
 __all__ = ["Search"]
@@ -142,7 +143,7 @@ class Search:
             curve=curve,
             of_the_curve=of_the_curve,
             others=errors_beside(self.judge, baseline.fit, final.fit, nearest.fit, misfit.noise),
-            laboratories=tuple(self.judge.laboratories(judged.fit, misfit.noise)),
+            laboratories=tuple(laboratories(self.experiment, judged.fit, misfit.noise)),
             notes=[*self.experiment.notes, *notes_of(self.judge, final.fit, baseline.fit)],
         )
         return self.found

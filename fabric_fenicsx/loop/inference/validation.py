@@ -16,9 +16,10 @@ from .fitting import Fit, fit
 
 __all__ = [
     "CrossValidation",
+    "Laboratory",
     "cross_validated",
-    "fitted_without",
     "has_own",
+    "laboratories",
     "parts_by",
     "stretches",
 ]
@@ -131,3 +132,45 @@ def _within(
         else replace(v, parameters=tuple(filter(seen, v.parameters)))
         for v in variants
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Laboratory:
+    """Readings of one folder, foretold from other folders.
+
+    Attributes:
+        folder: its number.
+        own: root mean square error with its own readings among those that are fitted.
+        foretold: error of what the others say of it.
+        expected: what they expect it to be, as laboratories and specimens differ.
+        size: root mean square of the readings.
+    """
+
+    folder: int
+    own: float
+    foretold: float
+    expected: float
+    size: float
+
+
+def laboratories(experiment: Experiment, model: Fit, noise: float) -> list[Laboratory]:
+    """What is said of each folder's fitted readings by those of the others; none of one.
+
+    Args:
+        experiment: the test.
+        model: that is fitted.
+        noise: one sigma of a reading.
+    """
+    found = []
+    readings = experiment.readings
+    parts = parts_by(readings.folder, model.used)
+    for part in parts if len(parts) > 1 else ():
+        other = fitted_without(experiment, model, part)
+        error = expected = float("nan")
+        if other is not None:
+            error = other.rms(part)
+            expected = float(np.hypot(noise, other.prediction_std(part)))
+        size = float(np.sqrt(np.mean(readings.observed[part] ** 2)))
+        number = int(readings.folder[part][0])
+        found.append(Laboratory(number, model.rms(part), error, expected, size))
+    return found
