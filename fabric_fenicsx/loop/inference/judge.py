@@ -183,9 +183,7 @@ class Judge:
         if model.fit not in self._misfits:
             rows = model.fit.used
             lined = self.components(model.fit, smooth=True)
-            noise = lined.variances.noise.typical(self._readings, rows)
-            if self.given and 1.0 / CRITERIA.scatter < noise / self.given < CRITERIA.scatter:
-                noise = self.given
+            noise = self._as_stated(lined.variances.noise.typical(self._readings, rows))
             own = model.estimate.variances.noise.typical(self._readings, rows)
             white = whiteness(
                 model.estimate.white * own / noise,
@@ -200,6 +198,12 @@ class Judge:
             printed = float(np.hypot(noise, own_error))
             self._misfits[model.fit] = Misfit(noise, printed, white)
         return self._misfits[model.fit]
+
+    def _as_stated(self, noise: float) -> float:
+        """What was stated, where a noise is no other: nobody knows theirs better."""
+        if self.given and 1.0 / CRITERIA.scatter < noise / self.given < CRITERIA.scatter:
+            return self.given
+        return noise
 
     def doubtful_noise(self, model: Model) -> bool:
         """Whether noise is more than was stated or, where none was, as slow as a misfit."""
@@ -327,10 +331,7 @@ class Judge:
         allowed = CRITERIA.roughly if roughly else CRITERIA.scatter
         # Held-out readings are compared with a noise that few others may be all that is known of.
         limit = max(allowed, self._by_chance(model, count, of_others=bool(out.any())))
-        found = self.misfit(model)
-        # A model's own error is known by a few others, and need not be of their shape.
-        by_itself = self._readings.model_error is not None and self.holdout(model.fit) < found.noise
-        return by_itself or bool(error * noise <= limit * found.reading)
+        return bool(error * self._as_stated(noise) <= limit * self.misfit(model).reading)
 
     def _known_of(self, model: Model) -> list[str]:
         """Parameters of terms without a formula, which have to be known where they foretell."""
