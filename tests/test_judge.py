@@ -224,6 +224,37 @@ def test_where_held_out_runs_contradict_one_term_beside_slow_noise_two_are_tried
     assert {e.name for e in found.effects} == {"rough", "other"}
 
 
+@pytest.mark.parametrize(
+    ("truth", "found"), [("term", {"wave", "term"}), ("names", {"wave", "step", "bow"})]
+)
+def test_three_names_do_not_stand_for_one_of_them_and_a_term(truth, found):
+    """A term is nearly two effects with names, and a third is there in truth."""
+    t = np.tile(np.linspace(0.0, 1.0, 120), 3)
+    columns = {"a": np.ones_like(t), "b": t, "wave": np.sin(2.0 * np.pi * t)}
+    columns["step"] = 1.0 / (1.0 + np.exp(-(t - 0.5) / 0.05))
+    columns["bow"] = t**4
+    names = columns["step"] + 2.0 * columns["bow"]
+    columns["term"] = names + 0.006 * np.sin(9.0 * np.pi * t)
+    seen = columns["wave"] + (columns["term"] if truth == "term" else names)
+    observed = 1.0 + 2.0 * t + seen + 0.01 * np.random.default_rng(4).normal(size=len(t))
+    data = readings(observed, run=np.repeat(np.arange(3), 120))
+    test = Linear(data, columns, ("a", "b"), noise=0.01)
+
+    test.effects = [
+        linear_effect(name) for name in ("wave", "step", "bow", "none", "nothing", "no")
+    ]
+    rng = np.random.default_rng(5)
+    columns |= {name: rng.normal(size=len(t)) for name in ("none", "nothing", "no")}
+    test.terms = [linear_effect("term", acts_on="moment")]
+    test.terms_are_rivals = test.each_its_own_way = False
+    assert {e.name for e in diagnose_test(test, ["wave", "step", "bow", "none"]).effects} == {
+        "wave",
+        "step",
+        "bow",
+    }
+    assert {e.name for e in diagnose_test(test).effects} == found
+
+
 def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None):
     """A line with a bend in it, or a round one: an effect is the bend, a term the round one.
 

@@ -148,7 +148,8 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
                 return _beside(_or_several(single, further, preferred.criterion), found)
     else:
         doubted = len(chosen.effects) > 1 and search.doubtful_noise
-        doubted |= further.may_be_one_more(final)
+        # Three with names may imitate one of them and a term.
+        doubted |= len(chosen.effects) > CRITERIA.most_terms or further.may_be_one_more(final)
         if doubted or search.judge.slow_noise(final):
             # It may be a misfit: what several terms explain instead is not said to be noise.
             several = _several(further, final.criterion)
