@@ -76,6 +76,8 @@ class Search:
         self.found: Diagnosis | None = None
         #: Effects that were tried in all their forms, and the forms beside which they were.
         self._in_all_forms: set[tuple[Effect, frozenset[Variant]]] = set()
+        #: Forms beside which everything was tried already.
+        self._added_beside: set[frozenset[Variant]] = set()
         self._kept_screen: Kept[Screen] = Kept(1)
         self._one_by_one: tuple[list[Candidate], list[list[Model]]] | None = None
 
@@ -174,6 +176,10 @@ class Search:
             elif not ahead:
                 break
             level[:] = self.models.best_refined([*level, *ahead])
+            if self._screened_first and ahead and level is levels[-1] and len(levels) > 2:
+                # Beside what was only tried in the place of another, others may do better.
+                self._with_one_less(levels)
+                self._exchanged(levels)
         return chosen, verdict, final, others
 
     def _with_other_readings(
@@ -254,13 +260,14 @@ class Search:
             self.models.take_noise_from(best.fit)
             self.models.base = self.models.baseline(self.models.base.values)
             bases = self._bases(count, levels[-1])
+            self._added_beside |= {frozenset(base.variants) for base in bases}
             levels.append(self._together(count, bases))
             if self._screened_first and levels[-1]:
                 # Before others take the place of what is only in the wrong form.
                 self._in_other_forms(levels)
             self._with_one_less(levels)
             if self._screened_first and levels[-1]:
-                self._exchanged(levels, bases)
+                self._exchanged(levels)
                 self._in_other_forms(levels)
             # With an effect of which nothing is left it is a model of fewer, which is among those.
             levels[-1] = [m for m in levels[-1] if not nothing_left(m.fit)]
@@ -439,7 +446,7 @@ class Search:
         new = [f for f in found if _is_new(f, levels[-2])]
         levels[-2] = self.models.best_refined([*levels[-2], *self.models.weighed(new)])
 
-    def _exchanged(self, levels: list[list[Model]], bases: Sequence[Fit]) -> None:
+    def _exchanged(self, levels: list[list[Model]]) -> None:
         """The best model of the last level with each effect in turn replaced by any other.
 
         What was added to the best model of one effect less stands for what that one has wrong; and
@@ -447,17 +454,15 @@ class Search:
 
         Args:
             levels: models by their number of effects, which more are added to.
-            bases: what everything was added to already.
         """
-        tried = {frozenset(base.variants) for base in bases}
         for _ in range(CRITERIA.exchanges):
             whole = levels[-1][0].fit.variants
             kept = [frozenset(whole) - {out} for out in whole]
             fewer = {frozenset(m.fit.variants): m for m in reversed(levels[-2])}
-            own = [k for k in kept if k in fewer and k not in tried]
+            own = [k for k in kept if k in fewer and k not in self._added_beside]
             if not own:
                 break
-            tried |= set(own)
+            self._added_beside |= set(own)
             found: list[Fit] = []
             for base in self.models.with_solutions([fewer[k] for k in own]):
                 more = self._added_to(base)
