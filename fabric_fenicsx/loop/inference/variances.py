@@ -197,9 +197,9 @@ def estimate(
         likelihood = min(likelihood, problem.cost(likeliest(alike(found)))[1])
     noise, taus, omega = problem.split(found)
     variances = Variances(noise, dict(zip(groups, taus.tolist(), strict=True)))
+    # What was not given then had no scatter.
     x0[3:] = [*(start.scatter.get(g, 0.0) ** 2 / SCATTER_UNIT for g in groups), *[0.0] * smooth]
-    sizes = [one.typical(at.readings, at.rows) for one in (start.noise, noise)]
-    unattained = problem.unattained(x0) * (sizes[0] / sizes[1]) ** 2
+    unattained = problem.unattained(x0) * (problem.floor / noise.typical(at.readings, at.rows)) ** 2
     return Estimate(variances, omega, restricted, likelihood, problem.white(found), unattained)
 
 
