@@ -82,6 +82,9 @@ class Linear:
     def settle(self, variants, values):
         pass
 
+    def added_alike(self, variant, variants):
+        return False
+
     def law(self, variants, values):
         return None
 

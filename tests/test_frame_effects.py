@@ -10,7 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fabric_fenicsx.loop.inference.beside import signed
+from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.picture_frame import PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
@@ -129,3 +133,54 @@ def test_no_candidate_fits_worse_than_the_baseline():
     before = found.baseline.rms(found.baseline.used)
     for candidate in found.candidates:
         assert candidate.fit.rms(found.baseline.used) <= before * (1.0 + 1e-9)
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """A test, its baseline, and that one's sensitivities to forms of all effects and terms."""
+    test = PictureFrame([measured()])
+    start = {p.name: p.starts[0] for p in test.baseline}
+    base = fit(test, (), start, test.readings.fit, Variances(Noise(SIGMA)))
+    every = signed(test, base, [*test.effects, *test.terms])
+    return test, base, {v: own for forms in every.values() for v, own in forms.items()}
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("crossover_friction",),
+        ("viscous_moment_of_time", "reading_of_displacement"),
+        ("reading_of_force",),
+        ("travel_of_displacement",),
+    ],
+)
+def test_what_adds_alike_is_not_asked_for_again(alone, names):
+    """Beside other effects it changes the readings as it did without, whatever numbers these have.
+
+    What is said to add alike is compared with the model of both.
+    """
+    test, base, known = alone
+    effects = [*test.effects, *test.terms]
+    variants = tuple(next(e for e in effects if e.name == n).variants[0] for n in names)
+    values = {name: 1.3 * value for name, value in base.values.items()}
+    values |= {p.name: p.starts[0] if p.starts else 0.1 for v in variants for p in v.parameters}
+    model = fit(test, variants, values, base.used, base.variances, evaluations=1)
+    others = [e for e in effects if e.name not in names][::3]
+    reused, asked = signed(test, model, others, known), signed(test, model, others)
+    size = np.abs(model.expected).max()
+    alike = 0
+    for effect in others:
+        for variant, own in asked[effect].items():
+            alike += test.added_alike(variant, variants)
+            assert len(reused[effect][variant]) == len(own)
+            for mine, other in zip(reused[effect][variant], own, strict=True):
+                assert mine.at == other.at
+                assert mine.slopes.keys() == other.slopes.keys()
+                assert np.allclose(mine.expected, other.expected, rtol=0.0, atol=1e-9 * size)
+                for name, slope in other.slopes.items():
+                    largest = np.abs(slope).max(initial=0.0)
+                    assert np.allclose(mine.slopes[name], slope, rtol=0.0, atol=1e-9 * largest)
+    moves = any(not v.adds_up for v in variants)
+    assert (alike == 0) == moves
+    if not moves:
+        assert alike > 20

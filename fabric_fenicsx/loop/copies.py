@@ -69,7 +69,8 @@ class _Copy:
     def __init__(
         self, function: Callable[[T], Any], tasks: Sequence[T], shared: Sequence[object]
     ) -> None:
-        ours, theirs = os.pipe()
+        # A file in memory: through a pipe a copy would wait with its answers until they are wanted.
+        self._file = os.memfd_create("answers", os.MFD_CLOEXEC)
         with warnings.catch_warnings():
             # Threads that draw a progress bar hold nothing that a copy needs.
             warnings.simplefilter("ignore", DeprecationWarning)
@@ -79,20 +80,22 @@ class _Copy:
             try:
                 # Memory is shared as long as nobody writes to it, as the collector does.
                 gc.disable()
-                os.close(ours)
                 signal.signal(signal.SIGINT, signal.SIG_DFL)
                 signal.signal(signal.SIGTERM, signal.SIG_DFL)
-                with os.fdopen(theirs, "wb") as stream:
+                with os.fdopen(self._file, "wb") as stream:
                     _work(function, tasks, shared, stream)
             finally:
                 os._exit(0)
-        os.close(theirs)
-        self._answers = os.fdopen(ours, "rb")
+        self._ended = False
 
     def answers(self, shared: Sequence[object]) -> list[Any]:
-        """Of its tasks."""
+        """Of its tasks, when it has done them."""
+        os.waitpid(self._process, 0)
+        self._ended = True
+        os.lseek(self._file, 0, os.SEEK_SET)
         try:
-            found, error = _Reader(self._answers, shared).load()
+            with os.fdopen(self._file, "rb", closefd=False) as stream:
+                found, error = _Reader(stream, shared).load()
         except (EOFError, pickle.UnpicklingError):
             raise SolveError("a copy of the process that was at work has ended") from None
         if error is not None:
@@ -101,11 +104,12 @@ class _Copy:
 
     def end(self) -> None:
         """It is not waited for any more."""
-        self._answers.close()
-        with suppress(ProcessLookupError):
-            os.kill(self._process, signal.SIGKILL)
-        with suppress(ChildProcessError):
-            os.waitpid(self._process, 0)
+        os.close(self._file)
+        if not self._ended:
+            with suppress(ProcessLookupError):
+                os.kill(self._process, signal.SIGKILL)
+            with suppress(ChildProcessError):
+                os.waitpid(self._process, 0)
 
 
 def _work(

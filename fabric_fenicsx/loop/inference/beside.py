@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from ...errors import SolveError
 from .effects import Effect, Variant
@@ -19,44 +20,63 @@ def by_itself(forms: Mapping[Variant, Sequence[Signature]]) -> list[Combination]
     return [((variant, shape),) for variant, shapes in forms.items() for shape in shapes]
 
 
-def signed(experiment: Experiment, model: Fit, effects: Sequence[Effect]) -> Signatures:
+def signed(
+    experiment: Experiment,
+    model: Fit,
+    effects: Sequence[Effect],
+    known: Mapping[Variant, Sequence[Signature]] = MappingProxyType({}),
+) -> Signatures:
     """A model's sensitivities to each form of some effects, where specimens are alike.
 
     Forms with a parameter that the model has are left out.
+
+    Args:
+        experiment: the test.
+        model: of it.
+        effects: that may be added.
+        known: sensitivities of the baseline, which may be the model's as well.
 
     Raises:
         SolveError: the model has no solution there.
     """
     expected, slopes = experiment.predict(model.variants, model.values)
-    known = set(model.values)
-    forms = [
-        (effect, variant)
+    own = set(model.values)
+    found: dict[Effect, dict[Variant, list[Signature]]] = {
+        effect: {v: [] for v in effect.variants if own.isdisjoint(p.name for p in v.parameters)}
         for effect in effects
-        for variant in effect.variants
-        if known.isdisjoint(p.name for p in variant.parameters)
-    ]
+    }
+    new: list[tuple[Effect, Variant]] = []
+    for effect, forms in found.items():
+        for variant in forms:
+            if variant in known and experiment.added_alike(variant, model.variants):
+                alike = known[variant]
+                forms[variant] = [one.beside(model.values, expected, slopes) for one in alike]
+            else:
+                new.append((effect, variant))
     every = each_by_itself(
         experiment,
         lambda form: signatures(experiment, model, expected, slopes, form[1]),
-        forms,
+        new,
         [expected, *slopes.values()],
     )
-    found: dict[Effect, dict[Variant, list[Signature]]] = {effect: {} for effect in effects}
-    for (effect, variant), own in zip(forms, every, strict=True):
-        found[effect][variant] = own
+    for (effect, variant), made in zip(new, every, strict=True):
+        found[effect][variant] = made
     return found
 
 
 def forms_beside(
-    experiment: Experiment, model: Fit, effects: Sequence[Effect]
+    experiment: Experiment,
+    model: Fit,
+    effects: Sequence[Effect],
+    known: Mapping[Variant, Sequence[Signature]] = MappingProxyType({}),
 ) -> list[Combination]:
-    """Every form of some effects, about a model of specimens that are alike.
+    """Every form of some effects, about a model of specimens that are alike; see signed.
 
     None where there is no such model: as specimens differ some of them may have a solution that
     what they have in common has not.
     """
     try:
-        every = signed(experiment, model, effects)
+        every = signed(experiment, model, effects, known)
     except SolveError:
         return []
     return [one for forms in every.values() for one in by_itself(forms)]

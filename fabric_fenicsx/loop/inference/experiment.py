@@ -251,6 +251,13 @@ class Experiment(Protocol):
         """Make predictions near a model as good as they can be, where they are approximate."""
         ...
 
+    def added_alike(self, variant: Variant, variants: Sequence[Variant]) -> bool:
+        """Whether what a form adds to the readings is the same without some others as with them.
+
+        And whatever the parameters of the baseline and of those others are.
+        """
+        ...
+
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Law | None:
         """The material law of a model, where the test has one that a curve shows."""
         ...

@@ -62,6 +62,21 @@ class Signature:
         """Whether there is next to nothing of the effect."""
         return all(abs(self.at[p.name]) <= SMALL for p in variant.amplitudes)
 
+    def beside(
+        self, values: dict[str, float], expected: Array, slopes: dict[str, Array]
+    ) -> Signature:
+        """The same of an effect that adds the same to another model.
+
+        Args:
+            values: of that model's parameters.
+            expected: its readings, (n,).
+            slopes: their derivatives, (n,) each.
+        """
+        added = expected
+        if self.expected is not self.base:
+            added = expected + (self.expected - self.base)
+        return Signature(self.at | values, added, expected, self.slopes | slopes)
+
 
 def signatures(
     experiment: Experiment,

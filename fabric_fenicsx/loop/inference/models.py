@@ -13,7 +13,7 @@ from .beside import forms_beside
 from .criteria import CRITERIA
 from .effects import Effect, Variant
 from .experiment import Experiment, Flags, each_by_itself
-from .first_order import SMALL, Combination
+from .first_order import SMALL, Combination, Signature
 from .fitting import Fit, fit, parameters_of, soft_size
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise
@@ -52,12 +52,14 @@ class Models:
         variances: what readings and specimens scatter by, as far as it is known now.
         base: the fitted baseline that effects are added to.
         forms: fits by the effects in them.
+        known: sensitivities of the baseline to forms that were looked at.
     """
 
     def __init__(self, experiment: Experiment, effects: Sequence[Effect]) -> None:
         self.experiment, self.effects = experiment, list(effects)
         self.judge = Judge(experiment, self.effects)
         self.forms: dict[frozenset[Effect], list[Fit]] = {}
+        self.known: dict[Variant, Sequence[Signature]] = {}
         #: Models that were fitted again with their own variances.
         self._refined: set[Model] = set()
         self.start = {p.name: p.starts[0] for p in experiment.baseline}
@@ -188,7 +190,8 @@ class Models:
             base = fit(*of, self.variances)
         except SolveError:
             return []
-        return self.fitted(forms_beside(self.experiment, base, [other]), starts=1, base=base)
+        every = forms_beside(self.experiment, base, [other], self.known)
+        return self.fitted(every, starts=1, base=base)
 
     def effects_of(self, model: Fit) -> tuple[Effect, ...]:
         """Effects of a fitted model, in the order of its forms."""

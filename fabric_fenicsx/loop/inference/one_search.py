@@ -278,6 +278,7 @@ class Search:
         self.progress(0.0, "signatures")
         base = self.models.base = self.models.baseline(self.models.start)
         self._signatures, self.models.forms = signed(self.experiment, base, self.effects), {}
+        self.models.known = {v: own for e in self._signatures.values() for v, own in e.items()}
         screen = self._screened()
         levels = [[self.models.refined(self.judge.weighed(base, ()))]]
         if not self.effects:
@@ -330,6 +331,7 @@ class Search:
     def _over_two_variables(self, candidates: list[Candidate]) -> list[Model]:
         """Models of the most promising terms over two variables, which join the candidates."""
         signs = signed(self.experiment, self.models.base, self._of_two)
+        self.models.known |= {v: own for forms in signs.values() for v, own in forms.items()}
         screen = self._screen(signs)
         found = self._after_a_glimpse(screen, signs, screen.most_promising(CRITERIA.glimpsed))
         tried = list(dict.fromkeys(model.effects[0] for model in found))
@@ -371,7 +373,7 @@ class Search:
         """
         present = self.models.effects_of(model)
         others = [e for e in (*self.effects, *self._of_two) if e not in present]
-        return forms_beside(self.experiment, model, others)
+        return forms_beside(self.experiment, model, others, self.models.known)
 
     def _bases(self, count: int, level: Sequence[Model]) -> list[Fit]:
         """Models that every other effect is added to, fitted with the variances as they are now.

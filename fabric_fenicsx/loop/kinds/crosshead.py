@@ -212,6 +212,10 @@ class CrossheadTest:
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """None: the moment depends on the angle, its rate and its past; see Experiment."""
 
+    def added_alike(self, variant: Variant, variants: Sequence[Variant]) -> bool:
+        """False: what moves the crossings depends on their moments; see Experiment."""
+        return False
+
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """What a term without a formula depends on, at every reading; see Experiment."""
         assert isinstance(variant, FrameVariant)

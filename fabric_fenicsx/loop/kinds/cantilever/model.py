@@ -327,6 +327,10 @@ class Cantilever:
             return float(kappa[np.argmax(bent)]) if bent.any() else self._largest_curvature
         return max(float(np.abs(shape.curvature).max()) for shape in shapes)
 
+    def added_alike(self, variant: Variant, variants: Sequence[Variant]) -> bool:
+        """False: strips hang by all that bends them; see Experiment."""
+        return False
+
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """What a term without a formula depends on, at every reading; see Experiment."""
         arc = self.readings.covariates["arc length [mm]"]

@@ -307,6 +307,10 @@ class Drape:
     def law(self, variants: Sequence[Variant], values: Mapping[str, float]) -> None:
         """None: angles on a sheet are on no curve; see Experiment."""
 
+    def added_alike(self, variant: Variant, variants: Sequence[Variant]) -> bool:
+        """False: they share the angles; see Experiment."""
+        return False
+
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """Nothing: there are no such terms of a drape."""
         raise NotImplementedError(variant.label)

@@ -23,7 +23,7 @@ from ufl import acos, sin
 
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
-from ...inference.effects import Effect
+from ...inference.effects import Effect, Variant
 from ...inference.experiment import OneCurve
 from ...measurement.schema import Measurement, Run
 from ..crosshead import CrossheadTest
@@ -129,6 +129,15 @@ class PictureFrame(CrossheadTest):
         return len(rate) > 0 and any(
             np.ptp(v) <= SAME_RATE * float(np.abs(v).max(initial=0.0)) for v in (speed, rate)
         )
+
+    def added_alike(self, variant: Variant, variants: Sequence[Variant]) -> bool:
+        """Where moments and readings add up, at the recorded angles; see Experiment."""
+        assert isinstance(variant, FrameVariant)
+        mine = [variant, *(v for v in variants if isinstance(v, FrameVariant))]
+        if variant.of_baseline or not all(v.adds_up for v in mine):
+            return False
+        own = mine if variant.laws is not None else mine[:1]
+        return not any(v.of_the_force for v in own)
 
     def _from_earlier_runs(self, variant: FrameVariant) -> dict[str, Array]:
         if not variant.carried:

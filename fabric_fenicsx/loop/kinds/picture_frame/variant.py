@@ -58,6 +58,16 @@ class FrameVariant(Variant):
     of_baseline: tuple[str, ...] = ()
     each_run: bool = False
 
+    @property
+    def adds_up(self) -> bool:
+        """Whether it adds to moments or readings, and leaves the travel and their zeros alone."""
+        return self.travel is None and self.added_travel is None and not self.each_run
+
+    @property
+    def of_the_force(self) -> bool:
+        """Whether what it adds to the reading depends on the force of the model."""
+        return bool({"force", "force_rate"} & set(self.of))
+
 
 def law_effects(
     laws: Iterable[type[CrossingLaw]], meanings: Mapping[str, str] = MappingProxyType({})
