@@ -231,18 +231,21 @@ class Screen:
             count: of sets of effects.
             forms: combinations of each.
         """
+        if not sets:
+            return []
         cost = np.log(self._count) * np.array([sum(g.parameters for g in one) for one in sets])
         order = np.argsort(cost - gains)
-        chosen: dict[frozenset[Effect], dict[frozenset[Variant], tuple[_Group, ...]]] = {}
-        for k in order:
-            one = sets[k]
-            effects = frozenset(g.effect for g in one)
-            if effects not in chosen and len(chosen) == count:
-                continue
-            own = chosen.setdefault(effects, {})
-            variants = frozenset(g.variant for g in one)
-            if variants not in own and len(own) < forms:
-                own[variants] = one
+        number = {e: k for k, e in enumerate({g.effect: None for g in self._groups})}
+        own = np.sort([[number[g.effect] for g in one] for one in sets])
+        _, same = np.unique(own, axis=0, return_inverse=True)
+        # The first of each set of effects that is met.
+        _, first = np.unique(same[order], return_index=True)
+        best = same[order][np.sort(first)[:count]]
+        chosen: dict[int, dict[frozenset[Variant], tuple[_Group, ...]]] = {k: {} for k in best}
+        for k in order[np.isin(same[order], best)]:
+            variants = frozenset(g.variant for g in sets[k])
+            if variants not in chosen[same[k]] and len(chosen[same[k]]) < forms:
+                chosen[same[k]][variants] = sets[k]
         return [one for own in chosen.values() for one in own.values()]
 
     def _gains(self, sets: Sequence[tuple[_Group, ...]]) -> Array:

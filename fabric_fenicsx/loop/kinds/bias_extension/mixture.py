@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -12,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...expressions.marching import Varying
+from ...kept import Kept
 from .phases import Phases
 from .solved import GROUPS, Name, Solved
 
@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 
 #: How much of what solved strips say is kept, each of some quantity of all runs, and numbers of it.
 KEPT, MOST_NUMBERS = 60, 12_000_000
+#: ... at travels that are asked for once, with each of their parameters.
+FEW = 8
 
 
 def number(value: float, slopes: Mapping[str, Any] = MappingProxyType({})) -> Varying:
@@ -48,15 +50,13 @@ class Travels:
     Args:
         D: travels [mm], (n_points, n_runs).
         phase: what the crossheads do there, (n_points, n_runs).
-        kept: whether what strips say is kept: of travels that are asked for again and again.
+        kept: whether all that strips say is kept: of travels that are asked for again and again.
     """
 
     def __init__(self, D: Array, phase: Phases, *, kept: bool = False) -> None:
         self._D, self._phase = D, phase
-        self._of = self._evaluated
-        if kept:
-            most = MOST_NUMBERS // max(D.size * GROUPS, 1)
-            self._of = lru_cache(maxsize=min(KEPT, most))(self._evaluated)
+        most = min(KEPT, MOST_NUMBERS // max(D.size * GROUPS, 1)) if kept else FEW
+        self._known: Kept[Array] = Kept(most)
 
     def of(self, solved: Solved, name: Name, order: int = 0) -> Array:
         """Angles and levers of all groups, rests or middles, or derivatives in D.
@@ -66,7 +66,8 @@ class Travels:
         Returns:
             (n_points, n_groups) of all runs together, or (n_points, n_runs).
         """
-        return self._of(solved, name, order)
+        asked = solved, name, order
+        return self._known(asked, (), lambda: self._evaluated(*asked))
 
     def _evaluated(self, solved: Solved, name: Name, order: int) -> Array:
         ways = enumerate(solved.ways)

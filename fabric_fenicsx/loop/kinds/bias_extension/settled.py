@@ -50,7 +50,8 @@ class Correction:
                 total = np.where(phase == one, own, total)
             return total
 
-        return Varying(found(0), {p: found(1) * slope for p, slope in D.slopes.items()})
+        along = found(1) if D.slopes else 0.0
+        return Varying(found(0), {p: along * slope for p, slope in D.slopes.items()})
 
 
 def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Correction:

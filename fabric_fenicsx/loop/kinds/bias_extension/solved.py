@@ -101,12 +101,11 @@ class Way:
             phase: what the crosshead does there, (n,).
             order: of a derivative in D.
         """
-        found = self.along(name, D, order)
-        for one, other in ((Phase.BACK, self.back), (Phase.STOPPED, self.stopped)):
-            flags = phase == one
-            if other is not None and flags.any():
-                flags = flags.reshape(-1, *([1] * (found.ndim - 1)))
-                found = np.where(flags, other.along(name, D, order), found)
+        others = {Phase.BACK: self.back, Phase.STOPPED: self.stopped}
+        found = np.empty((len(D), *(self.area.shape if name in ("gamma", "lever") else ())))
+        for one in np.unique(phase):
+            rows = phase == one
+            found[rows] = (others.get(one) or self).along(name, D[rows], order)
         return found
 
     def along(self, name: Name, D: Array, order: int) -> Array:
