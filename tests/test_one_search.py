@@ -125,6 +125,38 @@ def test_what_wins_as_a_rival_is_chosen(monkeypatch):
     assert best in levels[1]
 
 
+def test_beside_what_wins_as_a_rival_others_are_tried(monkeypatch):
+    """A term is found only in the place of another: what is wrong beside it is seen then."""
+    columns = {
+        "kink": lambda t: np.maximum(t - 0.6, 0.0),
+        "wave": lambda t: t**3,
+        "ripple": lambda t: np.sin(9.0 * t),
+        "bump": lambda t: np.exp(-(((t - 0.3) / 0.05) ** 2)),
+    }
+    terms = [linear_effect(name, acts_on="reading") for name in columns]
+    sizes = {"kink": 3.0, "ripple": 0.02, "bump": 0.1}
+    test = made(
+        columns, lambda t: sum(size * columns[name](t) for name, size in sizes.items()), terms
+    )
+    own = search(test)
+    kink, wave, ripple, bump = own.effects
+
+    def model(*effects):
+        forms = tuple(e.variants[0] for e in effects)
+        start = {"a": 10.0, "b": 2.0} | {e.name: 0.1 for e in effects}
+        return own.models.weighed([fit(test, forms, start, test.readings.fit, Variances(NOISE))])[0]
+
+    own._added_beside.clear()
+    levels = [[model()], [model(wave), model(kink)], [model(wave, ripple)]]
+    rival = model(kink, ripple)
+    assert rival.criterion < levels[2][0].criterion - 100.0
+    tried = iter([{wave: {kink: [rival]}}, {}, {}])
+    monkeypatch.setattr(one_search, "in_place", lambda *models: next(tried))
+    monkeypatch.setattr(one_search, "verdict_on", lambda *models: "effect_discovered")
+    chosen, _, final, _ = own._chosen_of(levels)
+    assert set(chosen.effects) == set(final.effects) == {kink, bump}
+
+
 class OnlyAsSpecimensDiffer(Linear):
     """Has no solution for specimens that are alike where there is much of an effect."""
 
