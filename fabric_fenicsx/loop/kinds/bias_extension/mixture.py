@@ -50,11 +50,15 @@ class Travels:
     Args:
         D: travels [mm], (n_points, n_runs).
         phase: what the crossheads do there, (n_points, n_runs).
+        of: runs whose crossings are wanted; by default all.
         kept: whether all that strips say is kept: of travels that are asked for again and again.
     """
 
-    def __init__(self, D: Array, phase: Phases, *, kept: bool = False) -> None:
+    def __init__(
+        self, D: Array, phase: Phases, of: Sequence[int] | None = None, *, kept: bool = False
+    ) -> None:
         self._D, self._phase = D, phase
+        self._runs = range(D.shape[1]) if of is None else of
         most = min(KEPT, MOST_NUMBERS // max(D.size * GROUPS, 1)) if kept else FEW
         self._known: Kept[Array] = Kept(most)
 
@@ -64,14 +68,15 @@ class Travels:
         Not to be written to.
 
         Returns:
-            (n_points, n_groups) of all runs together, or (n_points, n_runs).
+            (n_points, n_groups) of all wanted runs together, or (n_points, n_runs).
         """
         asked = solved, name, order
         return self._known(asked, (), lambda: self._evaluated(*asked))
 
     def _evaluated(self, solved: Solved, name: Name, order: int) -> Array:
-        ways = enumerate(solved.ways)
-        own = [way.at(name, self._D[:, r], self._phase[:, r], order) for r, way in ways]
+        runs = self._runs if name in ("gamma", "lever") else range(len(solved.ways))
+        D, phase = self._D, self._phase
+        own = [solved.ways[r].at(name, D[:, r], phase[:, r], order) for r in runs]
         found = np.column_stack(own)
         found.flags.writeable = False
         return found

@@ -172,13 +172,30 @@ class BiasExtension(CrossheadTest):
     # Rig ----------------------------------------------------------------------------------
 
     def _motion(self, measurement: Measurement, run: Run) -> Motion:
-        return crosshead_motion(run.columns["time_s"], run.columns["displacement_mm"])
+        """That of the force's readings, also of an angle that is read at some of them."""
+        own, whole = (
+            tuple(one.columns[name] for name in ("time_s", "displacement_mm"))
+            for one in (run, self._together.of_force(run))
+        )
+        rows = np.minimum(np.searchsorted(whole[0], own[0]), len(whole[0]) - 1)
+        if not all(np.array_equal(a, b[rows]) for a, b in zip(own, whole, strict=True)):
+            return crosshead_motion(*own)
+        found = crosshead_motion(*whole)
+        number = np.full(len(whole[0]) + 1, -1)
+        number[rows] = np.arange(len(rows))
+        return replace(
+            found,
+            # The last one is of the points between readings.
+            reading=number[found.reading],
+            rate_error=found.rate_error[rows],
+            certain=found.certain[rows],
+        )
 
     def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
         D, time = self._points["D"].value, self._points["time"].value
         self._runs = list(runs)
         rate = moving(self._points["D_rate"].value)
-        speed = speed_out(D, time, rate)
+        speed, parents = speed_out(D, time, rate), self._parent.tolist()
         # Strips alike are solved once, as far as the furthest of them goes.
         own_pace = np.log(speed)[self._parent]
         paces = np.round(own_pace / np.log(PACE))
@@ -195,7 +212,15 @@ class BiasExtension(CrossheadTest):
         stopped, (points, of) = np.zeros(len(runs), dtype=bool), self._recorded.place
         np.logical_or.at(stopped, of, self._phase[points, of] == Phase.STOPPED)
         stops = np.array([stopped[own].any() for own in same])
-        self._recorded_travels = Travels(D, self._phase, kept=True)
+        # An angle is read of a strip whose force is, mostly at the same places: its crossings go
+        # as they do in that run.
+        moved = np.stack([self._points[name].value for name in ("time", "D", "D_rate")])
+        alike = [
+            [a == b and np.array_equal(moved[..., j], moved[..., k]) for j, a in enumerate(parents)]
+            for k, b in enumerate(parents)
+        ]
+        self._going_runs, self._goes_as = np.unique(np.argmax(alike, axis=1), return_inverse=True)
+        self._recorded_travels = Travels(D, self._phase, self._going_runs, kept=True)
 
         def going(solved: Solved) -> dict[str, Varying]:
             parts = [Part(solved, number(1.0))]
@@ -393,16 +418,20 @@ class BiasExtension(CrossheadTest):
     # Model --------------------------------------------------------------------------------
 
     def _gathered(self, values: Array) -> Array:
-        points, runs = self._points["D"].value.shape
-        return np.asarray(values.reshape(points, runs, GROUPS).sum(axis=2))
+        return np.asarray(self._in_groups(values).sum(axis=2))[:, self._goes_as]
 
     def _shown(self, values: Array) -> Array:
-        points, runs = self._points["D"].value.shape
-        return self._recorded.at_readings(values.reshape(points, runs, GROUPS)[:, :, -1])
+        return self._recorded.at_readings(self._in_groups(values)[:, self._goes_as, -1])
+
+    def _in_groups(self, values: Array) -> Array:
+        """Of the crossings of each run that goes its own way, (n_points, n, GROUPS)."""
+        return values.reshape(len(values), len(self._going_runs), GROUPS)
 
     def _travels(self, D: Varying) -> Travels:
         """Travels of a model; most have those of the crossheads."""
-        return self._recorded_travels if D is self._points["D"] else Travels(D.value, self._phase)
+        if D is self._points["D"]:
+            return self._recorded_travels
+        return Travels(D.value, self._phase, self._going_runs)
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]
@@ -415,12 +444,13 @@ class BiasExtension(CrossheadTest):
 
     def _going(self, parts: Sequence[Part], D: Varying, speed: Varying) -> dict[str, Varying]:
         """How the crossings of solved strips go at some travels; see _kinematics."""
-        area = np.concatenate([way.area for way in parts[0].solved.ways])
+        ways, runs = parts[0].solved.ways, self._going_runs
+        area = np.concatenate([ways[r].area for r in runs])
         travels = self._travels(D)
 
         def each(values: Array) -> Array:
-            """Of every run, at each of its groups."""
-            return np.repeat(np.broadcast_to(values, D.value.shape), GROUPS, axis=1)
+            """Of those runs, at each of their groups."""
+            return np.repeat(np.broadcast_to(values, D.value.shape)[:, runs], GROUPS, axis=1)
 
         along = {p: each(slope) for p, slope in D.slopes.items()}
         gamma = of_groups(parts, travels, "gamma", along)

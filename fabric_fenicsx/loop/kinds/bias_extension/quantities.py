@@ -56,6 +56,11 @@ class ReadTogether:
         """Runs of angles, (n_runs,)."""
         return np.arange(len(self.parent)) > self.parent
 
+    def of_force(self, run: Run) -> Run:
+        """The run of forces that a run belongs to, or is."""
+        every = [one for m in self.measurements for one in m.runs]
+        return next(every[k] for one, k in zip(every, self.parent, strict=True) if one is run)
+
     @property
     def notes(self) -> list[str]:
         """What a report must say of angles, if there are any."""
