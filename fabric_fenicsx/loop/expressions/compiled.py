@@ -61,14 +61,17 @@ WRITTEN: dict[str, str] = {
 """What an operator of UFL is in C, by the name of its class."""
 
 FRAME = """#include <math.h>
-/* Inputs x, parameters p, memory h; M of them with partial derivatives P in x, h and p. */
-void march(long points, long records, long active, const double *x, const double *dx,
-           const double *p, const long *slot, double *h, double *dh)
+/* Inputs x, parameters p, memory h; M of them with partial derivatives P in x, h and p. Of the
+   inputs those in moving have slopes dx. */
+void march(long points, long records, long active, long moved, const double *x, const double *dx,
+           const long *moving, const double *p, const long *slot, const long *count,
+           double *h, double *dh)
 {{
   enum {{ X = {inputs}, M = {memory}, N = {parameters} }};
   const long size = points * records;
-  for (long r = 0; r < records; ++r)
-    for (long i = 0; i + 1 < points; ++i) {{
+  for (long i = 0; i + 1 < points; ++i)
+    for (long r = 0; r < records; ++r) {{
+      if (i + 1 >= count[r]) continue;
       const long at = i * records + r, next = at + records;
       double now[M], P[M][X + M + N];
 {body}
@@ -76,7 +79,8 @@ void march(long points, long records, long active, const double *x, const double
         h[m * size + next] = now[m];
         for (long a = 0; a < active; ++a) {{
           double d = 0.0;
-          for (int s = 0; s < X; ++s) d += P[m][s] * dx[(s * active + a) * size + at];
+          for (long s = 0; s < moved; ++s)
+            d += P[m][moving[s]] * dx[(s * active + a) * size + at];
           for (int s = 0; s < M; ++s) d += P[m][X + s] * dh[(s * active + a) * size + at];
           dh[(m * active + a) * size + next] = d;
         }}
@@ -105,10 +109,11 @@ def march(
         parameters: of the numbers.
 
     Returns:
-        A function of the inputs (n_inputs, n_points, n_records), their slopes
-        (n_inputs, n_active, n_points, n_records), the parameters' values, their places among the
-        active ones, and the memory before the first point (n_memory, n_records). It gives memory
-        and its slopes before each point, shaped likewise.
+        A function of the inputs (n_inputs, n_points, n_records), the slopes of those that have any
+        (n_moving, n_active, n_points, n_records), the numbers of these, the parameters' values,
+        their places among the active ones, the memory before the first point (n_memory, n_records),
+        and how many points each record has, (n_records,). It gives memory and its slopes before
+        each point, shaped likewise; nothing behind the last one.
     """
     places = (
         {name: f"x[{k} * size + at]" for k, name in enumerate(inputs)}
@@ -139,20 +144,25 @@ def march(
     n_memory = len(memory)
 
     def run(
-        x: Array, dx: Array, values: Array, slot: npt.NDArray[Any], first: Array
+        x: Array,
+        dx: Array,
+        moving: npt.NDArray[Any],
+        values: Array,
+        slot: npt.NDArray[Any],
+        first: Array,
+        count: npt.NDArray[Any],
     ) -> tuple[Array, Array]:
         points, records = x.shape[1:]
         active = dx.shape[1]
         h = np.zeros((n_memory, points, records))
         h[:, 0] = first
         dh = np.zeros((n_memory, active, points, records))
-        arrays = [np.ascontiguousarray(a, dtype=float) for a in (x, dx, values)]
-        index = np.ascontiguousarray(slot, dtype=ctypes.c_long)
+        real = [np.ascontiguousarray(a, dtype=float) for a in (x, dx, values)]
+        whole = [np.ascontiguousarray(a, dtype=ctypes.c_long) for a in (moving, slot, count)]
+        arrays = (*real[:2], whole[0], real[2], *whole[1:], h, dh)
         function(
-            ctypes.c_long(points),
-            ctypes.c_long(records),
-            ctypes.c_long(active),
-            *(ctypes.c_void_p(a.ctypes.data) for a in (*arrays, index, h, dh)),
+            *(ctypes.c_long(number) for number in (points, records, active, len(moving))),
+            *(ctypes.c_void_p(a.ctypes.data) for a in arrays),
         )
         return h, dh
 

@@ -90,6 +90,7 @@ class Marched:
         inputs: Mapping[str, Varying],
         values: Mapping[str, float | Array],
         first: Mapping[str, Array] = MappingProxyType({}),
+        count: Array | None = None,
     ) -> dict[str, Varying]:
         """Evaluate over whole records.
 
@@ -98,6 +99,8 @@ class Marched:
             values: of the parameters; without memory also those of each record, which broadcast.
             first: what is remembered before the first point of each record, (n_records,), by name
                 as in ``remembered``; of others nothing.
+            count: points of each record behind which nothing is remembered, as nothing is asked
+                for, (n_records,); the same arrays for the same expressions. By default all have it.
         """
         known = {name: inputs[name] for name in self.inputs}
         numbers: dict[str, Any] = {name: values[name] for name in self.parameters}
@@ -107,10 +110,12 @@ class Marched:
                 name: first.get(name.removeprefix("remembered "), 0.0) for name in self._memory
             }
             if self._own or any(varying.slopes for varying in known.values()):
-                known |= self._march(known, numbers, shape, begin)
+                known |= self._march(known, numbers, shape, begin, count)
             else:
                 given = [*(varying.value for varying in known.values()), *begin.values()]
-                known |= _kept(self, given, lambda: self._march(known, numbers, shape, begin))
+                known |= _kept(
+                    self, given, lambda: self._march(known, numbers, shape, begin, count)
+                )
         at = {name: varying.value for name, varying in known.items()} | numbers
         results = self._differentiated(known)(at)
         return {
@@ -132,15 +137,17 @@ class Marched:
         numbers: dict[str, float],
         shape: tuple[int, ...],
         first: Mapping[str, Any],
+        count: Array | None,
     ) -> dict[str, Varying]:
         """What is remembered before each point."""
         active = sorted({*self._own, *(p for v in known.values() for p in v.slopes)})
         place = {p: k for k, p in enumerate(active)}
         x = np.stack([spread(known[name].value, shape) for name in self.inputs])
-        dx = np.zeros((len(self.inputs), len(active), *shape))
-        for k, name in enumerate(self.inputs):
-            for p, slope in known[name].slopes.items():
-                dx[k, place[p]] = slope
+        moving = np.array([k for k, n in enumerate(self.inputs) if known[n].slopes], dtype=int)
+        dx = np.zeros((len(moving), len(active), *shape))
+        for own, k in zip(dx, moving, strict=True):
+            for p, slope in known[self.inputs[k]].slopes.items():
+                own[place[p]] = slope
         values = np.array([numbers[name] for name in self._own])
         slot = np.array([place[name] for name in self._own], dtype=int)
         if self._loop is None:
@@ -149,7 +156,8 @@ class Marched:
         h0 = np.zeros((len(self._memory), shape[1]))
         for k, name in enumerate(self._memory):
             h0[k] = first[name]
-        h, dh = self._loop(x, dx, values, slot, h0)
+        last = np.full(shape[1], shape[0]) if count is None else count
+        h, dh = self._loop(x, dx, moving, values, slot, h0, last)
         return {
             name: Varying(h[k], dict(zip(active, dh[k], strict=True)))
             for k, name in enumerate(self._memory)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from math import inf
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -163,6 +164,11 @@ class CrossheadTest:
     def _shown(self, values: Array) -> Array:
         """Of the crossings of a run the one that is shown, at every reading, (n,)."""
         return self._recorded.at_readings(values)
+
+    @cached_property
+    def _counts(self) -> Array:
+        """Points of each record of a crossing that are asked for, (n_crossings,)."""
+        return self._recorded.counts
 
     # Data ---------------------------------------------------------------------------------
 
@@ -406,7 +412,7 @@ class CrossheadTest:
     ) -> Varying:
         """The same from its compiled expressions."""
         first = {} if variant is None else self._from_earlier_runs(variant)
-        moment = self._compiled[key](known, values, first)["moment"]
+        moment = self._compiled[key](known, values, first, self._counts)["moment"]
         if variant is None or variant.by_run is None:
             return moment
         return moment * self._by_run(variant, values)

@@ -41,6 +41,14 @@ class RecordedRig:
         self._compiled = compiled
         self.before = np.zeros(len(motions))
 
+    @cached_property
+    def counts(self) -> Array:
+        """Points of each record, and the next one, which differences need, (n_runs,)."""
+        points, run = self.place
+        last = np.zeros(self.points["D"].value.shape[1], dtype=int)
+        np.maximum.at(last, run, points)
+        return np.minimum(last + 2, len(self.points["D"].value))
+
     def at_readings(self, values: Array) -> Array:
         """Of values at the points those at every reading, (n,)."""
         return spread(values, self.points["D"].value.shape)[self.place]

@@ -417,6 +417,10 @@ class BiasExtension(CrossheadTest):
 
     # Model --------------------------------------------------------------------------------
 
+    @cached_property
+    def _counts(self) -> Array:
+        return np.repeat(self._recorded.counts[self._going_runs], GROUPS)
+
     def _gathered(self, values: Array) -> Array:
         return np.asarray(self._in_groups(values).sum(axis=2))[:, self._goes_as]
 
