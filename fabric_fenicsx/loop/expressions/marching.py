@@ -100,7 +100,7 @@ class Marched:
             first: what is remembered before the first point of each record, (n_records,), by name
                 as in ``remembered``; of others nothing.
             count: points of each record behind which nothing is remembered, as nothing is asked
-                for, (n_records,); the same arrays for the same expressions. By default all have it.
+                for, (n_records,), always the same for the same expressions; by default all of them.
         """
         known = {name: inputs[name] for name in self.inputs}
         numbers: dict[str, Any] = {name: values[name] for name in self.parameters}

@@ -238,6 +238,8 @@ class Screen:
         number = {e: k for k, e in enumerate({g.effect: None for g in self._groups})}
         own = np.sort([[number[g.effect] for g in one] for one in sets])
         _, same = np.unique(own, axis=0, return_inverse=True)
+        # As a column in one version of numpy.
+        same = same.ravel()
         # The first of each set of effects that is met.
         _, first = np.unique(same[order], return_index=True)
         best = same[order][np.sort(first)[:count]]
