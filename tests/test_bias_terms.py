@@ -121,6 +121,29 @@ def test_jaws_that_give_turn_the_crossings_less(back):
     assert (moved[angles] < force[angles]).all()
 
 
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [("travel_of_force", "linear"), ("dissipative_moment_of_path", "path, linear")],
+)
+def test_angles_that_were_read_seldom_are_those_read_each_time(name, label):
+    """Along the force's record, whose crossings are followed once, in a law with memory too."""
+    found = []
+    for between, step in ((2, 1), (1, 2)):
+        measurement = of_runs(run_of(force=FORCE, back=True))
+        test = BiasExtension([with_angles(measurement, every=between)])
+        assert test._going_runs.tolist() == [0]
+        variant = term(test, name, label)
+        values = VALUES | dict.fromkeys((p.name for p in variant.parameters), 0.02)
+        expected, slopes = test.predict((variant,), values)
+        force, angle = (np.flatnonzero(test.readings.run == run) for run in (0, 1))
+        rows = np.concatenate([force, angle[::step]])
+        # In degrees: a newton is as many of them as their scatter says.
+        unit = np.where(rows > force[-1], test.readings.others[0].unit, 1.0)
+        found.append(np.stack([expected[rows], *(slopes[n][rows] for n in sorted(slopes))]) / unit)
+    size = np.abs(found[0]).max(axis=1, keepdims=True)
+    assert (np.abs(found[0] - found[1]) <= 1e-9 * size).all() and (size > 0.0).all()
+
+
 def test_one_way_at_one_speed_is_one_curve(back):
     one = of_runs(run_of(force=FORCE[:29]))
     alike = BiasExtension([one]).alike

@@ -150,3 +150,17 @@ def test_what_was_before_the_first_point_is_not_kept_for_another():
         y = marched({"x": x}, {"p": 2.0}, {"largest": first})["y"].value
         expected = 2.0 * np.maximum.accumulate(np.r_[first, 0.1, 0.5])
         assert y[:, 0] == pytest.approx(expected, rel=1e-14)
+
+
+def test_nothing_is_remembered_behind_the_end_of_a_record():
+    """Records of which some are shorter: up to its end each is as if all had all points."""
+    x = Varying(np.random.default_rng(2).normal(size=(9, 3)), {"r": np.ones((9, 3))})
+    values, count = {"p": 2.0, "q": 0.3}, np.array([9, 4, 6])
+    whole = a_law_with_memory()({"x": x}, values)["y"]
+    short = a_law_with_memory()({"x": x}, values, count=count)["y"]
+    for record, end in enumerate(count):
+        rows = np.s_[:end, record]
+        assert np.array_equal(short.value[rows], whole.value[rows])
+        for name in "pqr":
+            assert np.array_equal(short.slopes[name][rows], whole.slopes[name][rows])
+    assert not short.value[4:, 1].any() and whole.value[4:, 1].all()
