@@ -16,7 +16,7 @@ from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.models import Models
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.one_search import Search
-from fabric_fenicsx.loop.inference.search import _alike, diagnose_test
+from fabric_fenicsx.loop.inference.search import _alike, _to_be_parted, diagnose_test
 from fabric_fenicsx.loop.inference.variances import Variances
 
 RUNS, EACH = 4, 150
@@ -155,6 +155,21 @@ def test_beside_what_wins_as_a_rival_others_are_tried(monkeypatch):
     monkeypatch.setattr(one_search, "verdict_on", lambda *models: "effect_discovered")
     chosen, _, final, _ = own._chosen_of(levels)
     assert set(chosen.effects) == set(final.effects) == {kink, bump}
+
+
+@pytest.mark.parametrize(("acts_on", "last"), [("", "rival"), ("reading", "other 3")])
+def test_a_rival_with_a_name_is_told_apart_before_those_without(acts_on, last):
+    """A further test is looked for of so many pairs: terms alike do not take its place."""
+    own, rival = linear_effect("own", acts_on="reading"), linear_effect("rival", acts_on=acts_on)
+    fits = SimpleNamespace(sum_of_squares=1.0)
+    pairs = [("own", [fits], f"other {k}", [fits]) for k in range(4)]
+    search, another = (
+        SimpleNamespace(models=SimpleNamespace(forms={frozenset({e}): [fits]}), found=None)
+        for e in (own, rival)
+    )
+    search.found = SimpleNamespace(pairs=pairs)
+    _to_be_parted(search, [own], another, rival)
+    assert [pair[2] for pair in pairs] == ["other 0", "other 1", "other 2", last]
 
 
 class OnlyAsSpecimensDiffer(Linear):

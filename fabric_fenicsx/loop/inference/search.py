@@ -261,9 +261,15 @@ def _name(search: Search, own: Effect, another: Search, rival: Effect) -> None:
 
 
 def _to_be_parted(search: Search, own: Sequence[Effect], another: Search, rival: Effect) -> None:
-    """Effects of a search's diagnosis and a rival, for which a further test is looked for."""
+    """Effects of a search's diagnosis and a rival, for which a further test is looked for.
+
+    A rival with a name takes the place of another one where there are as many as are looked for.
+    """
     assert search.found is not None
-    if len(search.found.pairs) < CRITERIA.pairs:
+    pairs = search.found.pairs
+    if rival.listed:
+        del pairs[CRITERIA.pairs - 1 :]
+    if len(pairs) < CRITERIA.pairs:
         mine = nearest_forms(search.models.forms[frozenset(own)])
         its = nearest_forms(another.models.forms[frozenset({rival})])
-        search.found.pairs.append((own[0].name, mine, rival.name, its))
+        pairs.append((own[0].name, mine, rival.name, its))
