@@ -64,7 +64,7 @@ FRAME = """#include <math.h>
 /* Inputs x, parameters p, memory h; M of them with partial derivatives P in x, h and p. Of the
    inputs those in moving have slopes dx. */
 void march(long points, long records, long active, long moved, const double *x, const double *dx,
-           const long *moving, const double *p, const long *slot, const long *count,
+           const double *p, const long *moving, const long *slot, const long *count,
            double *h, double *dh)
 {{
   enum {{ X = {inputs}, M = {memory}, N = {parameters} }};
@@ -159,10 +159,9 @@ def march(
         dh = np.zeros((n_memory, active, points, records))
         real = [np.ascontiguousarray(a, dtype=float) for a in (x, dx, values)]
         whole = [np.ascontiguousarray(a, dtype=ctypes.c_long) for a in (moving, slot, count)]
-        arrays = (*real[:2], whole[0], real[2], *whole[1:], h, dh)
         function(
             *(ctypes.c_long(number) for number in (points, records, active, len(moving))),
-            *(ctypes.c_void_p(a.ctypes.data) for a in arrays),
+            *(ctypes.c_void_p(a.ctypes.data) for a in (*real, *whole, h, dh)),
         )
         return h, dh
 

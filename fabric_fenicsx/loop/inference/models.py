@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import SolveError
-from .beside import forms_beside
+from .beside import forms_beside, signed
 from .criteria import CRITERIA
 from .effects import Effect, Variant
 from .experiment import Experiment, Flags, each_by_itself
@@ -17,6 +17,7 @@ from .first_order import SMALL, Combination, Signature
 from .fitting import Fit, fit, parameters_of, soft_size
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise
+from .screen import Signatures
 from .starts import around_jumps, fit_combinations
 from .variances import Variances
 
@@ -52,14 +53,14 @@ class Models:
         variances: what readings and specimens scatter by, as far as it is known now.
         base: the fitted baseline that effects are added to.
         forms: fits by the effects in them.
-        known: sensitivities of the baseline to forms that were looked at.
     """
 
     def __init__(self, experiment: Experiment, effects: Sequence[Effect]) -> None:
         self.experiment, self.effects = experiment, list(effects)
         self.judge = Judge(experiment, self.effects)
         self.forms: dict[frozenset[Effect], list[Fit]] = {}
-        self.known: dict[Variant, Sequence[Signature]] = {}
+        #: Sensitivities of the baseline to forms that were looked at.
+        self._known: dict[Variant, Sequence[Signature]] = {}
         #: Models that were fitted again with their own variances.
         self._refined: set[Model] = set()
         self.start = {p.name: p.starts[0] for p in experiment.baseline}
@@ -190,8 +191,17 @@ class Models:
             base = fit(*of, self.variances)
         except SolveError:
             return []
-        every = forms_beside(self.experiment, base, [other], self.known)
-        return self.fitted(every, starts=1, base=base)
+        return self.fitted(self.beside(base, [other]), starts=1, base=base)
+
+    def signed(self, effects: Sequence[Effect]) -> Signatures:
+        """The baseline's sensitivities to each form of some effects; see beside.signed."""
+        found = signed(self.experiment, self.base, effects)
+        self._known |= {v: own for forms in found.values() for v, own in forms.items()}
+        return found
+
+    def beside(self, model: Fit, effects: Sequence[Effect]) -> list[Combination]:
+        """Every form of some effects beside a model; see beside.forms_beside."""
+        return forms_beside(self.experiment, model, effects, self._known)
 
     def effects_of(self, model: Fit) -> tuple[Effect, ...]:
         """Effects of a fitted model, in the order of its forms."""

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 
 from ...errors import SolveError
 from ..kept import Kept
-from .beside import by_itself, forms_beside, signed
+from .beside import by_itself
 from .choice import chosen_model, in_place_of, models_instead, verdict_on
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
@@ -277,8 +277,7 @@ class Search:
         """Candidates by themselves, and models of no effect and of one."""
         self.progress(0.0, "signatures")
         base = self.models.base = self.models.baseline(self.models.start)
-        self._signatures, self.models.forms = signed(self.experiment, base, self.effects), {}
-        self.models.known = {v: own for e in self._signatures.values() for v, own in e.items()}
+        self._signatures, self.models.forms = self.models.signed(self.effects), {}
         screen = self._screened()
         levels = [[self.models.refined(self.judge.weighed(base, ()))]]
         if not self.effects:
@@ -330,8 +329,7 @@ class Search:
 
     def _over_two_variables(self, candidates: list[Candidate]) -> list[Model]:
         """Models of the most promising terms over two variables, which join the candidates."""
-        signs = signed(self.experiment, self.models.base, self._of_two)
-        self.models.known |= {v: own for forms in signs.values() for v, own in forms.items()}
+        signs = self.models.signed(self._of_two)
         screen = self._screen(signs)
         found = self._after_a_glimpse(screen, signs, screen.most_promising(CRITERIA.glimpsed))
         tried = list(dict.fromkeys(model.effects[0] for model in found))
@@ -373,7 +371,7 @@ class Search:
         """
         present = self.models.effects_of(model)
         others = [e for e in (*self.effects, *self._of_two) if e not in present]
-        return forms_beside(self.experiment, model, others, self.models.known)
+        return self.models.beside(model, others)
 
     def _bases(self, count: int, level: Sequence[Model]) -> list[Fit]:
         """Models that every other effect is added to, fitted with the variances as they are now.

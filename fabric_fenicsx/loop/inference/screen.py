@@ -237,10 +237,8 @@ class Screen:
         order = np.argsort(cost - gains)
         number = {e: k for k, e in enumerate({g.effect: None for g in self._groups})}
         own = np.sort([[number[g.effect] for g in one] for one in sets])
-        _, same = np.unique(own, axis=0, return_inverse=True)
-        # As a column in one version of numpy.
-        same = same.ravel()
-        # The first of each set of effects that is met.
+        # One number for each set of effects, of which the first that are met are the best.
+        same = own @ len(number) ** np.arange(own.shape[1])
         _, first = np.unique(same[order], return_index=True)
         best = same[order][np.sort(first)[:count]]
         chosen: dict[int, dict[frozenset[Variant], tuple[_Group, ...]]] = {k: {} for k in best}

@@ -55,7 +55,12 @@ class Travels:
     """
 
     def __init__(
-        self, D: Array, phase: Phases, of: Sequence[int] | None = None, *, kept: bool = False
+        self,
+        D: Array,
+        phase: Phases,
+        of: Sequence[int] | npt.NDArray[np.int64] | None = None,
+        *,
+        kept: bool = False,
     ) -> None:
         self._D, self._phase = D, phase
         self._runs = range(D.shape[1]) if of is None else of

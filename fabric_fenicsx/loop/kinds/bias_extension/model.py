@@ -195,7 +195,7 @@ class BiasExtension(CrossheadTest):
         D, time = self._points["D"].value, self._points["time"].value
         self._runs = list(runs)
         rate = moving(self._points["D_rate"].value)
-        speed, parents = speed_out(D, time, rate), self._parent.tolist()
+        speed = speed_out(D, time, rate)
         # Strips alike are solved once, as far as the furthest of them goes.
         own_pace = np.log(speed)[self._parent]
         paces = np.round(own_pace / np.log(PACE))
@@ -215,11 +215,11 @@ class BiasExtension(CrossheadTest):
         # An angle is read of a strip whose force is, mostly at the same places: its crossings go
         # as they do in that run.
         moved = np.stack([self._points[name].value for name in ("time", "D", "D_rate")])
-        alike = [
-            [a == b and np.array_equal(moved[..., j], moved[..., k]) for j, a in enumerate(parents)]
-            for k, b in enumerate(parents)
+        goes_as = [
+            force if np.array_equal(moved[..., force], moved[..., run]) else run
+            for run, force in enumerate(self._parent)
         ]
-        self._going_runs, self._goes_as = np.unique(np.argmax(alike, axis=1), return_inverse=True)
+        self._going_runs, self._goes_as = np.unique(goes_as, return_inverse=True)
         self._recorded_travels = Travels(D, self._phase, self._going_runs, kept=True)
 
         def going(solved: Solved) -> dict[str, Varying]:
