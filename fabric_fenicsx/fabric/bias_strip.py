@@ -200,9 +200,9 @@ class BiasStrip:
         Raises:
             ValueError: the bias is not 45°, or the strip is shorter than twice its width.
         """
-        middle, sides = self._areas()
+        middle, sides = self.areas()
         work = middle * moment(gamma) + sides * moment(gamma / 2.0) / 2.0
-        return work / self._pull(gamma)
+        return work / self.pull(gamma)
 
     def moment(self, gamma: Floats, force: Floats) -> Floats:
         """Moment per area m(γ) [N/mm] of a measured curve by the same balance of energy, at 45°.
@@ -221,8 +221,8 @@ class BiasStrip:
         """
         if not (np.diff(gamma, prepend=0.0) > 0.0).all():
             raise ValueError("strip: the angles must increase from above 0")
-        middle, sides = self._areas()
-        of = np.append(0.0, gamma), np.append(0.0, force * self._pull(gamma) / middle)
+        middle, sides = self.areas()
+        of = np.append(0.0, gamma), np.append(0.0, force * self.pull(gamma) / middle)
         ratio, moment, factor, angle = sides / (2.0 * middle), np.zeros_like(gamma), 1.0, gamma
         # g falls at least as the angle below the first reading, so the last term is round-off.
         while angle.max() > ROUNDING:
@@ -252,8 +252,12 @@ class BiasStrip:
             shares[k] = _area(corners) / (spacings[0] * spacings[1])
         return shares
 
-    def _areas(self) -> tuple[float, float]:
-        """Areas of the zones A and B at 45° [mm²]."""
+    def areas(self) -> tuple[float, float]:
+        """Areas of the zones A and B at 45° [mm²].
+
+        Raises:
+            ValueError: the bias is not 45°, or the strip is shorter than twice its width.
+        """
         if self.bias != 45.0 or self.length < 2.0 * self.width:
             raise ValueError(
                 f"strip: {self.length:g} mm long, {self.width:g} mm wide, at {self.bias:g} "
@@ -261,8 +265,8 @@ class BiasStrip:
             )
         return self.width * (2.0 * self.length - 3.0 * self.width) / 2.0, self.width**2
 
-    def _pull(self, gamma: Floats) -> Floats:
-        """dd/dγ of zone A at 45° [mm]."""
+    def pull(self, gamma: Floats) -> Floats:
+        """dd/dγ of zone A at 45° [mm], of its angles [rad]."""
         half = gamma / 2.0
         pull: Floats = (self.length - self.width) / 2.0 * (np.cos(half) - np.sin(half))
         return pull

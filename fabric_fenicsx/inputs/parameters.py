@@ -25,6 +25,8 @@ class Parameter:
             cantilever "curvature" or "moment", the largest of them in the fitted baseline.
         jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
             for on both sides.
+        of_model: whether it says which model of the rig is nearer, and nothing of the fabric: the
+            same for all specimens.
         run, specimen: the run, or the specimen, counted from 0, that it alone belongs to.
     """
 
@@ -36,6 +38,7 @@ class Parameter:
     meaning: str = ""
     share_of: str = ""
     jumps: bool = False
+    of_model: bool = False
     run: int | None = None
     specimen: int | None = None
 

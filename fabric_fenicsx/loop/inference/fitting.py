@@ -235,13 +235,14 @@ def parameters_of(experiment: Experiment, variants: Sequence[Variant]) -> list[P
 def groups_of(experiment: Experiment, variants: Sequence[Variant]) -> dict[str, tuple[str, ...]]:
     """Parameters that may differ between specimens, by group: those of a group differ together.
 
-    Each of the baseline's is one, and the amplitudes of each effect, unless a run or a specimen
-    has its own. One specimen alone shows no difference.
+    Each of the baseline's fabric is one, and the amplitudes of each effect, unless a run or a
+    specimen has its own. One specimen alone shows no difference.
     """
     readings = experiment.readings
     if len(np.unique(readings.specimen[readings.fit])) < 2:
         return {}
-    groups: dict[str, tuple[str, ...]] = {p.name: (p.name,) for p in experiment.baseline}
+    fabric = [p.name for p in experiment.baseline if not p.of_model]
+    groups: dict[str, tuple[str, ...]] = {name: (name,) for name in fabric}
     for v in variants:
         own = tuple(p.name for p in v.amplitudes if not p.of_one)
         if own:

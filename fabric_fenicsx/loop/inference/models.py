@@ -79,7 +79,8 @@ class Models:
             floor = estimated_noise(first.residual, readings, rows)
             if not floor > 0.0:
                 floor = 1e-6 * float(abs(readings.observed[rows]).max(initial=1e-6))
-        scatter = {p.name: FIRST_SCATTER for p in self.experiment.baseline}
+        fabric = [p.name for p in self.experiment.baseline if not p.of_model]
+        scatter = dict.fromkeys(fabric, FIRST_SCATTER)
         return Variances(Noise(floor), scatter)
 
     def baseline(self, start: dict[str, float]) -> Fit:

@@ -180,7 +180,7 @@ class CrossheadTest:
         """
         rows = self.readings.fit
         _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
-        J = np.column_stack([slopes[p.name] for p in self.baseline])
+        J = np.column_stack([slopes[p.name] for p in BASELINE])
         if rows.sum() <= len(self.baseline):
             return
         k = np.linalg.lstsq(J[rows], self.readings.observed[rows], rcond=None)[0]
@@ -197,18 +197,29 @@ class CrossheadTest:
             self.readings = replace(self.readings, usable=self.readings.usable & clear)
 
     def _start(self) -> None:
-        """Begin fits of the baseline with its least squares, which are linear."""
+        """Begin fits of the baseline with its least squares, which are linear in BASELINE."""
         rows = self.readings.fit
         if rows.sum() <= len(self.baseline):
             return
-        _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
-        J = np.column_stack([slopes[p.name][rows] for p in self.baseline])
+        found = [self._least_squares(rows, more) for more in self._more_starts()]
+        start, _ = min(found, key=lambda one: one[1])
+        self.baseline = tuple(replace(p, starts=(start[p.name],)) for p in self.baseline)
+
+    def _more_starts(self) -> Sequence[Mapping[str, float]]:
+        """Values of what a rig's baseline has beside BASELINE, of which the best is begun with."""
+        return ({},)
+
+    def _least_squares(
+        self, rows: Flags, more: Mapping[str, float]
+    ) -> tuple[dict[str, float], float]:
+        """BASELINE beside other parameters of the baseline, and the sum of squares left."""
+        nothing = dict.fromkeys((p.name for p in BASELINE), 0.0)
+        expected, slopes = self.predict((), {**nothing, **more})
+        J = np.column_stack([slopes[name][rows] for name in nothing])
         scale = np.linalg.norm(J, axis=0)
         scale[scale == 0.0] = 1.0
-        k = nnls(J / scale, self.readings.observed[rows])[0] / scale
-        self.baseline = tuple(
-            replace(p, starts=(float(value),)) for p, value in zip(self.baseline, k, strict=True)
-        )
+        k, left = nnls(J / scale, (self.readings.observed - expected)[rows])
+        return {**dict(zip(nothing, (k / scale).tolist(), strict=True)), **more}, float(left)
 
     # Model --------------------------------------------------------------------------------
 
@@ -373,7 +384,7 @@ class CrossheadTest:
         """Moment per area [N] of the baseline or of an effect."""
         key = ((variant.like or variant) if variant is not None else None, "moment")
         if key not in self._compiled:
-            parameters = self.baseline if variant is None else variant.parameters
+            parameters = BASELINE if variant is None else variant.parameters
             names = tuple(p.name for p in parameters)
             names += () if variant is None else variant.of_baseline
             marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
@@ -396,7 +407,7 @@ class CrossheadTest:
         if known is not self._still:
             return self._made_moment(variant, key, known, values)
         # Beside each of many effects the same model again: its moments are known.
-        own = self.baseline if variant is None else variant.parameters
+        own = BASELINE if variant is None else variant.parameters
         of_baseline = () if variant is None else variant.of_baseline
         numbers = tuple(values[name] for name in (*(p.name for p in own), *of_baseline))
         return self._kept_moments(

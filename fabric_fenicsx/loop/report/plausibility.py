@@ -49,7 +49,8 @@ def _faint(d: Diagnosis, model: Fit) -> Iterator[str]:
                     f"the effect ({variant.label}) may not be there."
                 )
     for p in d.experiment.baseline:
-        if p.name not in model.at_bound and errors[p.name] > abs(model.values[p.name]):
+        known = p.of_model or p.name in model.at_bound
+        if not known and errors[p.name] > abs(model.values[p.name]):
             yield f"The standard error of {p.name} exceeds it: these readings do not know it."
 
 

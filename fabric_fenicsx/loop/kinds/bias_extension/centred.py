@@ -63,6 +63,9 @@ class _Place:
 class CentredBiasExtension(BiasExtension):
     """Bias extension of one fabric about models that were settled; see BiasExtension."""
 
+    # The strips are solved as they are.
+    may_be_even = False
+
     def __init__(self, *arguments: Any, **named: Any) -> None:
         self._places: dict[frozenset[Variant], _Place] = {}
         self._about: list[Part] | None = None

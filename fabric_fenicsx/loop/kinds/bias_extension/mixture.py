@@ -113,6 +113,7 @@ def of_ways(
     travels: Travels,
     slopes: Mapping[str, Array],
     name: Literal["rest", "middle"],
+    order: int = 0,
 ) -> Varying:
     """What the ways of strips say, (n_points, n_runs): their rest, or the angle of the middle.
 
@@ -123,11 +124,12 @@ def of_ways(
         travels: of its runs.
         slopes: derivatives of the travels by parameter, (n_points, n_runs) each.
         name: which of the two.
+        order: of a derivative in the travel.
     """
     total = number(0.0)
     for part in parts:
-        change = {p: travels.of(part.solved, name, 1) * slope for p, slope in slopes.items()}
-        own = Varying(travels.of(part.solved, name), change)
+        along = {p: travels.of(part.solved, name, order + 1) * s for p, s in slopes.items()}
+        own = Varying(travels.of(part.solved, name, order), along)
         weight = part.weight * part.size if name == "rest" else part.weight
         total += weight * own
     return total

@@ -37,6 +37,7 @@ from ..picture_frame.variant import FrameVariant
 from ..records import shifted
 from .curves import Moment, at_knots, at_knots_back
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
+from .even_shear import EVEN, SHARES, ZONES, EvenZones, beside, in_zones, of_both
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
 from .mixture import Part, Travels, number, of_groups, of_ways
 from .phases import GONE_BACK, Phase, backward, moving, phases_of, speed_out
@@ -60,6 +61,8 @@ DASHPOT = "c1_N_s"
 SETTLED = 0.02
 #: Sets of strips of which it is kept how their crossings go.
 MOTIONS = 8
+#: Shares of even shear that fits may begin with.
+EVEN_STARTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Least work of moments, over that of the first curve, that strips slip at.
 LEAST_SIZE = 1e-6
 
@@ -83,6 +86,8 @@ class BiasExtension(CrossheadTest):
     terms_are_rivals = True
     # The strip is solved as a whole.
     in_copies = False
+    #: Whether the baseline may have a share that shears evenly; see even_shear.
+    may_be_even = True
 
     def __init__(
         self,
@@ -252,6 +257,9 @@ class BiasExtension(CrossheadTest):
             for way, D in zip(first.ways, self._furthest, strict=True)
         ]
         self._mixture = [Part(first, number(1.0))]
+        self._even = self._even_zones(runs)
+        if self._even is not None:
+            self.baseline = (*self.baseline, EVEN)
         self._reached = reached(first, self._furthest)
         self._reached /= float(self._reached @ first.curve.moments)
 
@@ -259,6 +267,21 @@ class BiasExtension(CrossheadTest):
         along = {"displacement [mm]": self._recorded.at_readings(self._points["D"].value)}
         found = replace(readings, covariates={**along, **readings.covariates})
         return self._together.named(found)
+
+    def _even_zones(self, runs: Sequence[tuple[Measurement, Run]]) -> EvenZones | None:
+        """The zones of all runs, where angles are read that are fitted and their formula holds."""
+        fitted = [not run.holdout for _, run in runs]
+        if not (self.may_be_even and (self._angles & np.array(fitted)).any()):
+            return None
+        try:
+            return EvenZones([strip_of(m, run) for m, run in runs])
+        except ValueError:
+            return None
+
+    def _more_starts(self) -> Sequence[Mapping[str, float]]:
+        if self._even is None:
+            return super()._more_starts()
+        return [{EVEN.name: share} for share in EVEN_STARTS]
 
     @property
     def _on_the_load_cell(self) -> Array:
@@ -419,17 +442,22 @@ class BiasExtension(CrossheadTest):
 
     @cached_property
     def _counts(self) -> Array:
-        return np.repeat(self._recorded.counts[self._going_runs], GROUPS)
+        return np.repeat(self._recorded.counts[self._going_runs], self._columns)
+
+    @property
+    def _columns(self) -> int:
+        """Of each run that goes its own way: groups of its crossings, and zones that are even."""
+        return GROUPS if self._even is None else GROUPS + ZONES
 
     def _gathered(self, values: Array) -> Array:
         return np.asarray(self._in_groups(values).sum(axis=2))[:, self._goes_as]
 
     def _shown(self, values: Array) -> Array:
-        return self._recorded.at_readings(self._in_groups(values)[:, self._goes_as, -1])
+        return self._recorded.at_readings(self._in_groups(values)[:, self._goes_as, GROUPS - 1])
 
     def _in_groups(self, values: Array) -> Array:
-        """Of the crossings of each run that goes its own way, (n_points, n, GROUPS)."""
-        return values.reshape(len(values), len(self._going_runs), GROUPS)
+        """Of the crossings of each run that goes its own way, (n_points, n, n_columns)."""
+        return values.reshape(len(values), len(self._going_runs), self._columns)
 
     def _travels(self, D: Varying) -> Travels:
         """Travels of a model; most have those of the crossheads."""
@@ -443,8 +471,14 @@ class BiasExtension(CrossheadTest):
         recorded = D is self._points["D"] and speed is self._points["D_rate"]
         if recorded and not more and not one.weight.slopes and one.weight.value == 1.0:
             # The same arrays again: what laws make of them alone is kept; see Marched.
-            return self._of_recorded(one.solved)
-        return self._going(self._mixture, D, speed)
+            found = self._of_recorded(one.solved)
+        else:
+            found = self._going(self._mixture, D, speed)
+        if self._even is None:
+            return found
+        share = values.get(EVEN.name, 0.0)
+        weights = of_both(share, len(self._going_runs), GROUPS)
+        return {**found, "factor": found["factor"] * weights}
 
     def _going(self, parts: Sequence[Part], D: Varying, speed: Varying) -> dict[str, Varying]:
         """How the crossings of solved strips go at some travels; see _kinematics."""
@@ -452,14 +486,22 @@ class BiasExtension(CrossheadTest):
         area = np.concatenate([ways[r].area for r in runs])
         travels = self._travels(D)
 
-        def each(values: Array) -> Array:
-            """Of those runs, at each of their groups."""
-            return np.repeat(np.broadcast_to(values, D.value.shape)[:, runs], GROUPS, axis=1)
+        def each(values: Array, columns: int = self._columns) -> Array:
+            """Of those runs, in each of their columns."""
+            return np.repeat(np.broadcast_to(values, D.value.shape)[:, runs], columns, axis=1)
 
-        along = {p: each(slope) for p, slope in D.slopes.items()}
+        along = {p: each(slope, GROUPS) for p, slope in D.slopes.items()}
+        pace = Varying(each(speed.value), {p: each(slope) for p, slope in speed.slopes.items()})
         gamma = of_groups(parts, travels, "gamma", along)
         lever = of_groups(parts, travels, "lever", along)
-        pace = Varying(each(speed.value), {p: each(slope) for p, slope in speed.slopes.items()})
+        factor = Varying(area) * lever
+        if self._even is not None:
+            zone, zone_lever = self._even.angle(parts, travels, D)
+            own, count = self._of_going, len(runs)
+            gamma = beside(gamma, in_zones(own(zone), SHARES), count)
+            lever = beside(lever, in_zones(own(zone_lever), SHARES), count)
+            weighed = SHARES * self._even.areas[runs]
+            factor = beside(factor, in_zones(own(self._even.lever(zone)), weighed), count)
         return {
             "gamma": gamma,
             "gamma_n": Varying(
@@ -468,10 +510,14 @@ class BiasExtension(CrossheadTest):
             "rate": lever * pace,
             "per_time": Varying(each(self._points["per_time"].value)),
             "rate_per_speed": lever,
-            "factor": Varying(
-                area * lever.value, {p: area * slope for p, slope in lever.slopes.items()}
-            ),
+            "factor": factor,
         }
+
+    def _of_going(self, of_runs: Varying) -> Varying:
+        """Of those runs that go their own way, (n_points, n)."""
+        shape, runs = of_runs.value.shape, self._going_runs
+        slopes = {p: np.broadcast_to(s, shape)[:, runs] for p, s in of_runs.slopes.items()}
+        return Varying(of_runs.value[:, runs], slopes)
 
     def _force(
         self, travel: Any, variants: Sequence[FrameVariant], values: Mapping[str, float]
@@ -480,13 +526,13 @@ class BiasExtension(CrossheadTest):
         whole = super()._force(travel, variants, values)
         D, travels = travel["D"], self._travels(travel["D"])
         rest = of_ways(self._mixture, travels, D.slopes, "rest")
-        found = self._pull = whole + rest + self._correction(variants, travel, "force")
+        rest += self._correction(variants, travel, "force")
+        found = self._pull = whole + rest * self._of_net(values)
         if not self._angles.any():
             return found
-        middle = of_ways(self._mixture, travels, D.slopes, "middle")
         # Of runs of angles nothing else counts.
         degree = np.asarray(np.degrees(self._together.unit))
-        angles = (middle + self._correction(variants, travel, "middle")) * Varying(degree)
+        angles = self._middle(travel, variants, values) * Varying(degree)
         return Varying(
             np.where(self._angles, angles.value, found.value),
             {
@@ -494,6 +540,25 @@ class BiasExtension(CrossheadTest):
                 for p in found.slopes | angles.slopes
             },
         )
+
+    def _of_net(self, values: Mapping[str, float]) -> Varying:
+        """Share of the strip that does not shear evenly."""
+        if self._even is None:
+            return number(1.0)
+        return number(1.0 - values.get(EVEN.name, 0.0), {EVEN.name: -1.0})
+
+    def _middle(
+        self, travel: Any, variants: Sequence[Variant], values: Mapping[str, float]
+    ) -> Varying:
+        """Mean shear angle of the middle zone [rad], (n_points, n_runs)."""
+        D, travels = travel["D"], self._travels(travel["D"])
+        middle = of_ways(self._mixture, travels, D.slopes, "middle")
+        middle += self._correction(variants, travel, "middle")
+        if self._even is None:
+            return middle
+        zone, _ = self._even.angle(self._mixture, travels, D)
+        share = number(values.get(EVEN.name, 0.0), {EVEN.name: 1.0})
+        return middle * self._of_net(values) + zone * share
 
     def _acting(self, force: Varying) -> Varying:
         """The force of the strip also where its angle is read."""
@@ -507,9 +572,7 @@ class BiasExtension(CrossheadTest):
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
         """Mean shear angle of the middle zone at every reading [degrees], (n,)."""
         self._mixture = self._mixed(variants, values)
-        travels = self._travels(self._points["D"])
-        middle = of_ways(self._mixture, travels, {}, "middle")
-        middle += self._correction(variants, self._points, "middle")
+        middle = self._middle(self._points, variants, values)
         return self._recorded.at_readings(np.degrees(middle.value))
 
     @property
