@@ -142,7 +142,7 @@ def test_only_strips_whose_holds_are_read_are_solved_standing_still():
         "force_N": np.zeros(len(D) + 2),
     }
     strips = BiasExtension([measured(short, long, replace(held, columns=columns))])
-    *_, stops = strips._strips._strips
+    *_, stops, _ = strips._strips._strips
     assert stops.tolist() == [False, False, True]
 
 

@@ -41,7 +41,7 @@ from .even_shear import EVEN, SHARES, ZONES, EvenZones, beside, in_zones, of_bot
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
 from .mixture import Part, Travels, number, of_groups, of_ways
 from .phases import GONE_BACK, Phase, backward, moving, phases_of, speed_out
-from .quantities import first_curve, read_together, strip_of
+from .quantities import coarser, first_curve, read_together, strip_of
 from .settled import Correction, Quantity, correction
 from .solved import GROUPS, Solved, SolvedStrips, Wanted, reached
 from .strip import FINE_STEPS, KNOTS, Curve, strip_case
@@ -59,6 +59,8 @@ PACE = 1.5
 DASHPOT = "c1_N_s"
 #: Share by which a curve, a slip or a crimp may differ from those that a fit was solved with.
 SETTLED = 0.02
+#: Share of what strips are solved at below which an effect is none; share of a net that is none.
+SLIGHT = 1e-3
 #: Sets of strips of which it is kept how their crossings go.
 MOTIONS = 8
 #: Shares of even shear that fits may begin with.
@@ -234,6 +236,11 @@ class BiasExtension(CrossheadTest):
         self._of_recorded = lru_cache(maxsize=MOTIONS)(going)
         for (m, run), travel, pace in zip(runs, self._furthest, self._speed, strict=True):
             strip_case(m, run, float(travel), float(pace), {})
+        self._even = self._even_zones(runs)
+        if self._even is not None:
+            self.baseline = (*self.baseline, EVEN)
+        even = self._even is not None
+        spaced = np.array([coarser(m, run) if even else 1.0 for m, run in runs])
         # Of the curve that laws with memory and dashpots follow, the same throughout.
         angles = [
             strip_of(m, run).angle(0.5 * D)
@@ -243,7 +250,7 @@ class BiasExtension(CrossheadTest):
         self._typical_rate = float(np.nanmedian(rates))
         like = self._like
         paths = {} if like is None else like._strips.paths
-        strips = self._furthest, self._speed, back, stops
+        strips = self._furthest, self._speed, back, stops, spaced
         self._strips: SolvedStrips = SolvedStrips(runs, *strips, paths)
         suggested = self._first
         if suggested is None:
@@ -257,9 +264,6 @@ class BiasExtension(CrossheadTest):
             for way, D in zip(first.ways, self._furthest, strict=True)
         ]
         self._mixture = [Part(first, number(1.0))]
-        self._even = self._even_zones(runs)
-        if self._even is not None:
-            self.baseline = (*self.baseline, EVEN)
         self._reached = reached(first, self._furthest)
         self._reached /= float(self._reached @ first.curve.moments)
 
@@ -339,7 +343,9 @@ class BiasExtension(CrossheadTest):
         for v in variants:
             if isinstance(v, StripPullVariant) and v.changes is not None:
                 value = values[v.parameters[0].name]
-                changes |= v.changes(value) if value > 0.0 else {}
+                changes |= v.changes(value) if value > SLIGHT * v.solved_at[0] else {}
+        if not changes and self._of_net(values).value < SLIGHT:
+            return
         curve = self._curve(variants, values, self._moments(variants, values).value)
         if key in self._settled:
             known, with_these = self._settled[key]

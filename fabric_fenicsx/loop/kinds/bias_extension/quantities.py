@@ -20,7 +20,15 @@ from ...measurement.readings import common_noise
 from ...measurement.schema import Measurement, Run
 from .strip import KNOTS, Curve
 
-__all__ = ["ANGLE", "ReadTogether", "first_curve", "force_noise", "read_together", "strip_of"]
+__all__ = [
+    "ANGLE",
+    "ReadTogether",
+    "coarser",
+    "first_curve",
+    "force_noise",
+    "read_together",
+    "strip_of",
+]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -31,6 +39,9 @@ FEWEST = 4
 #: Least sigma [degrees] of an angle, and least share of the largest force of a force, where it is
 #: not given: what authors have smoothed is not known that well.
 LEAST_ANGLE, LEAST_FORCE = 0.5, 1e-3
+#: Meshes' diagonals over the width of a strip, at most, where shares of even shear make up for what
+#: fewer miss.
+DIAGONALS = 12
 #: k1 and k3 [N/mm] of the curve that strips are first solved with where readings tell nothing.
 FIRST = (0.002, 0.02)
 
@@ -172,6 +183,12 @@ def _angles(run: Run, unit: float) -> Run:
 def strip_of(measurement: Measurement, run: Run) -> BiasStrip:
     """The strip of a run."""
     return BiasStrip(run.own["length_mm"], run.own["width_mm"], measurement.rig.bias_deg)
+
+
+def coarser(measurement: Measurement, run: Run) -> float:
+    """By how much further apart than they are a strip's tows may be taken to be."""
+    most = run.own["width_mm"] / (np.sqrt(2.0) * DIAGONALS)
+    return max(float(most / measurement.fabric.tow_spacing_mm), 1.0)
 
 
 def first_curve(runs: Sequence[tuple[Measurement, Run]]) -> Curve:

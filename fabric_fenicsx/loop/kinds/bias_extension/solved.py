@@ -174,6 +174,7 @@ class SolvedStrips:
         speed: at which [mm/s], (n_runs,).
         back: whether it is let back as well, (n_runs,).
         stops: whether it is wanted as it stands still, too, (n_runs,).
+        coarser: by how much further apart than they are its tows are taken to be, (n_runs,).
         paths: of strips that were solved before, by what they were solved with; is added to.
 
     Attributes:
@@ -191,10 +192,11 @@ class SolvedStrips:
         speed: Array,
         back: Flags,
         stops: Flags,
+        coarser: Array,
         paths: dict[Task, StripPath],
     ) -> None:
         self._runs, self._furthest = list(runs), furthest
-        self._strips = furthest, speed, back, stops
+        self._strips = furthest, speed, back, stops, coarser
         self._groups: dict[int, npt.NDArray[np.int64]] = {}
         self._known: dict[str, list[Solved]] = {}
         self.paths = paths
@@ -271,10 +273,9 @@ class SolvedStrips:
         places: list[Task] = []
         for run, changes, curve in wanted:
             measurement, own = self._runs[run]
-            travel, pace, back, stops = (of[run] for of in self._strips)
-            case = strip_case(
-                measurement, own, float(travel), float(pace), changes, steps, bool(back)
-            )
+            travel, pace, back, stops, coarser = (of[run] for of in self._strips)
+            way = float(travel), float(pace), changes, steps, bool(back)
+            case = strip_case(measurement, own, *way, float(coarser))
             places.append((case.model_dump_json(), curve, bool(stops)))
             if places[-1] not in self.paths:
                 tasks.setdefault(places[-1], (case, curve, bool(stops)))

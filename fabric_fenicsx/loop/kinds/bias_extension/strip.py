@@ -48,6 +48,8 @@ KNOTS = np.array([0.0, 3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 38.0, 44.0, 50.0, 56.0,
 STEPS, FINE_STEPS = 18, 40
 #: Least slope of a curve over the largest moment: nothing else holds crossings that do nothing.
 LEAST_SLOPE = 1e-3
+#: Keys of a crossing that stands for so much fabric.
+OF_A_CROSSING = ("crossover.slip_limit_N", "crossover.translation_N_mm")
 #: Models that are kept: those of three strips, pinned, slipping, crimped and both, and some more.
 KEPT = 16
 #: Of a model that any other is put into.
@@ -146,6 +148,7 @@ def strip_case(
     changes: Mapping[str, Any],
     steps: int = STEPS,
     back: bool = False,
+    coarser: float = 1.0,
 ) -> BiasExtensionCase:
     """The case of a run's way out, its crossings without a moment of their own.
 
@@ -157,11 +160,15 @@ def strip_case(
         changes: other keys, by their dotted names.
         steps: of the way, if none fails.
         back: whether it is let back to where it began.
+        coarser: by how much further apart than they are its tows are taken to be.
 
     Raises:
         InputError: there can be no such strip.
     """
     fabric, own = measurement.fabric, run.own
+    spacing = coarser * fabric.tow_spacing_mm
+    fabric = fabric.model_copy(update={"tow_spacing_mm": spacing})
+    changes = {k: v * coarser**2 if k in OF_A_CROSSING else v for k, v in changes.items()}
     tow = tow_of(fabric, fabric.tow.C1_MPa)
     if "bending_in_plane_Nmm" in fabric.tow.model_fields_set:
         tow["stiffness"] = {"bending_in_plane_Nmm": fabric.tow.bending_in_plane_Nmm}
@@ -171,8 +178,8 @@ def strip_case(
         "length_mm": own["length_mm"],
         "width_mm": own["width_mm"],
         "bias_deg": measurement.rig.bias_deg,
-        "warp_spacing_mm": fabric.tow_spacing_mm,
-        "weft_spacing_mm": fabric.tow_spacing_mm,
+        "warp_spacing_mm": spacing,
+        "weft_spacing_mm": spacing,
         "travel_mm": travel,
         "rate_mm_min": 60.0 * rate,
         "hold_s": 0.0,
