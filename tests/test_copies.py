@@ -9,7 +9,7 @@ from linear import Linear, linear_effect, readings
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop import copies
-from fabric_fenicsx.loop.copies import in_copies
+from fabric_fenicsx.loop.copies import in_copies, put_off_in_copies
 from fabric_fenicsx.loop.inference.search import diagnose_test
 
 
@@ -50,6 +50,26 @@ def test_one_task_or_one_core_needs_no_copy(monkeypatch):
     monkeypatch.setattr(copies, "cores", lambda: 1)
     assert in_copies(lambda _: os.getpid(), range(5)) == [os.getpid()] * 5
     assert in_copies(lambda _: os.getpid(), []) == []
+
+
+@pytest.mark.parametrize("cores", [1, 3])
+def test_what_a_copy_cannot_do_is_done_here_when_the_others_are_done(cores, monkeypatch):
+    monkeypatch.setattr(copies, "cores", lambda: cores)
+    solved = []
+
+    def task(k):
+        known = len(solved)
+        if k % 2:
+            put_off_in_copies()
+            solved.append(k)
+        return k, known, os.getpid()
+
+    found = in_copies(task, range(6))
+    assert [k for k, _, _ in found] == list(range(6))
+    # The even ones know nothing of what the odd ones find, and these come in their order.
+    assert [known for _, known, _ in found] == [0, 0, 0, 1, 0, 2]
+    assert solved == [1, 3, 5] and {pid for *_, pid in found[1::2]} == {os.getpid()}
+    put_off_in_copies()
 
 
 def test_known_objects_stay_the_very_same():

@@ -2,7 +2,9 @@
 
 A copy (fork) knows all that is known here, compiled expressions and functions of functions, which a
 process of its own would have to be told. It ends when its share is done, and what it has learnt by
-then is lost with it but for what it returns. Nothing that needs MPI or PETSc is done in one.
+then is lost with it but for what it returns. Nothing that needs MPI or PETSc is done in one: a task
+that turns out to is put off, by whichever process has it, until the others are done. So all of
+these find what was known before, and their answers do not depend on how many processes there are.
 """
 
 from __future__ import annotations
@@ -12,20 +14,44 @@ import os
 import pickle
 import signal
 import warnings
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from enum import Enum
 from typing import Any, BinaryIO, TypeVar
 
 from ..errors import SolveError
 from ..parallel import cores
 
-__all__ = ["in_copies"]
+__all__ = ["PutOff", "in_copies", "put_off_in_copies"]
 
 #: Processes at most: a search has little that many could share, and each needs memory.
 MOST = 8
 
 T = TypeVar("T")
 R = TypeVar("R")
+
+
+class PutOff(Exception):
+    """A task is put off until no work is shared with copies any more."""
+
+
+class _Answer(Enum):
+    """What is there in the place of an answer."""
+
+    PUT_OFF = "put off"
+
+
+_is_shared = False
+
+
+def put_off_in_copies() -> None:
+    """To be called before what needs MPI or PETSc.
+
+    Raises:
+        PutOff: while work is shared with copies.
+    """
+    if _is_shared:
+        raise PutOff
 
 
 def in_copies(
@@ -45,22 +71,46 @@ def in_copies(
         SolveError: a copy has ended before it was done, for want of memory perhaps.
         Exception: what the function raised of a task.
     """
-    count = min(cores(), len(tasks), MOST)
-    if count < 2:
-        return [function(task) for task in tasks]
+    count = max(min(cores(), len(tasks), MOST), 1)
     shared = list(known)
     found: list[Any] = [None] * len(tasks)
     copies: list[_Copy] = []
     try:
         for k in range(1, count):
             copies.append(_Copy(function, tasks[k::count], shared))
-        found[::count] = [function(task) for task in tasks[::count]]
+        found[::count] = _answers(function, tasks[::count])
         for k, copy in enumerate(copies, 1):
             found[k::count] = copy.answers(shared)
     finally:
         for copy in copies:
             copy.end()
+    for k, task in enumerate(tasks):
+        if found[k] is _Answer.PUT_OFF:
+            found[k] = function(task)
     return found
+
+
+def _answers(function: Callable[[T], Any], tasks: Sequence[T]) -> list[Any]:
+    """What a function returns of tasks while work is shared."""
+
+    def answer(task: T) -> Any:
+        try:
+            return function(task)
+        except PutOff:
+            return _Answer.PUT_OFF
+
+    with _sharing():
+        return [answer(task) for task in tasks]
+
+
+@contextmanager
+def _sharing() -> Iterator[None]:
+    global _is_shared
+    before, _is_shared = _is_shared, True
+    try:
+        yield
+    finally:
+        _is_shared = before
 
 
 class _Copy:
@@ -119,7 +169,7 @@ def _work(
     found: list[Any] | None = None
     error: Exception | None = None
     try:
-        found = [function(task) for task in tasks]
+        found = _answers(function, tasks)
     except Exception as raised:
         error = raised
     _Writer(stream, shared).dump((found, error))

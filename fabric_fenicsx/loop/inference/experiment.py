@@ -219,7 +219,7 @@ class Experiment(Protocol):
 
     @property
     def in_copies(self) -> bool:
-        """Whether copies of the process may predict: there is no MPI and no PETSc in it."""
+        """Whether copies of the process may predict, without MPI and PETSc; see copies."""
         ...
 
     @property

@@ -42,9 +42,9 @@ class StripPullVariant(FrameVariant):
 
 SLIP = Parameter(
     "slip_1_N",
-    (1.0, 5.0),
+    (1.0, 3.0),
     0.0,
-    40.0,
+    20.0,
     amplitude=True,
     meaning="one over the in-plane force at which tows slip at a crossing",
     share_of="per_tow_force",
@@ -103,7 +103,7 @@ BIAS_EXTENSION_EFFECTS = (
                     # Of no weight beside the slip, in half the iterations.
                     "crossover.translation_N_mm": 10.0,
                 },
-                solved_at=(0.6, 1.2, 2.5, 5.0, 10.0, 20.0, 40.0),
+                solved_at=(0.6, 1.2, 2.5, 5.0, 10.0, 20.0),
                 per_force=True,
             ),
         ),

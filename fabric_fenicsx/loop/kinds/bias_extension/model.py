@@ -86,8 +86,6 @@ class BiasExtension(CrossheadTest):
     curves_only = False
     # Each of its readings is of crossings at many angles: laws of other variables look more alike.
     terms_are_rivals = True
-    # The strip is solved as a whole.
-    in_copies = False
     #: Whether the baseline may have a share that shears evenly; see even_shear.
     may_be_even = True
 

@@ -41,7 +41,7 @@ FEWEST = 4
 LEAST_ANGLE, LEAST_FORCE = 0.5, 1e-3
 #: Meshes' diagonals over the width of a strip, at most, where shares of even shear make up for what
 #: fewer miss.
-DIAGONALS = 12
+DIAGONALS = 8
 #: k1 and k3 [N/mm] of the curve that strips are first solved with where readings tell nothing.
 FIRST = (0.002, 0.02)
 

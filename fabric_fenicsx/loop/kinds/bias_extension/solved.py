@@ -18,6 +18,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ....errors import SolveError
+from ...copies import put_off_in_copies
 from ...measurement.schema import Measurement, Run
 from ...workers import each_of
 from .phases import SIGN, Phase, Phases
@@ -278,6 +279,7 @@ class SolvedStrips:
             case = strip_case(measurement, own, *way, float(coarser))
             places.append((case.model_dump_json(), curve, bool(stops)))
             if places[-1] not in self.paths:
+                put_off_in_copies()
                 tasks.setdefault(places[-1], (case, curve, bool(stops)))
         order = sorted(tasks, key=lambda key: -tasks[key][0].length_mm * tasks[key][0].width_mm)
         stopped: dict[Task, Exception] = {}
