@@ -301,7 +301,7 @@ def test_slip_begins_where_forces_are_though_none_was_read():
     (slip,) = (v for e in alone.effects if e.name == "crossover_slip" for v in e.variants)
     on_a_tow = path.force[-1] / WIDTH * 5.0
     assert slip.parameters[0].starts[0] * on_a_tow == pytest.approx(1.0, rel=0.05)
-    assert slip.solved_at[-1] * on_a_tow == pytest.approx(40.0, rel=0.05)
+    assert slip.solved_at[-1] * on_a_tow == pytest.approx(20.0, rel=0.05)
 
 
 def test_a_strip_without_readings_is_refused():

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -33,7 +33,7 @@ from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
-from .recorded_rig import RecordedRig
+from .recorded_rig import RecordedRig, left_by
 from .records import of_a_crossing, runs_before, typical
 
 __all__ = ["CrossheadTest"]
@@ -331,11 +331,15 @@ class CrossheadTest:
         travel = self._recorded.travel(travels[0] if travels else None, values)
         whole = self._force(travel, mine, values)
         for v in mine:
-            if v.added_travel is not None:
+            if v.added_travel is None:
+                continue
+            if v.rounds == 0:
                 # The force with the travel as it would be without: what is added is little.
                 ahead = self._recorded.added(v, "travel", self._acting(whole), values)
-                travel = self._recorded.moved(travel, ahead)
-                whole = self._force(travel, mine, values)
+            else:
+                ahead = left_by(partial(self._added_travel, v, mine, values), travel, v.rounds)
+            travel = self._recorded.moved(travel, ahead)
+            whole = self._force(travel, mine, values)
         zeros: list[tuple[Flags, Array]] = []
         cell = Varying(np.asarray(self._on_the_load_cell))
         read = whole
@@ -361,6 +365,17 @@ class CrossheadTest:
                 found[name] = slope.copy()
                 found[name][rows] -= J @ np.linalg.lstsq(J, slope[rows], rcond=None)[0]
         return self._recorded.at_readings(force), found
+
+    def _added_travel(
+        self,
+        variant: FrameVariant,
+        variants: Sequence[FrameVariant],
+        values: Mapping[str, float],
+        travel: Any,
+    ) -> Varying:
+        """What a form adds to the travel [mm] by the force at a travel."""
+        force = self._acting(self._force(travel, variants, values))
+        return self._recorded.added(variant, "travel", force, values)
 
     def _force(
         self, travel: Any, variants: Sequence[FrameVariant], values: Mapping[str, float]

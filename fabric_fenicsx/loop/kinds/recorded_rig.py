@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,12 @@ from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
 from .records import laid_out
 
-__all__ = ["RecordedRig"]
+__all__ = ["RecordedRig", "left_by"]
 
 Array = npt.NDArray[np.float64]
 
+#: Name of the derivative by the travel, beside those by parameters.
+BY_TRAVEL = "travel"
 #: Readings of a run that tell nothing of an acceleration.
 FEWEST = 3
 
@@ -34,12 +36,14 @@ class RecordedRig:
         points: by name, (n_points, n_runs) each.
         place: point and run of every reading, (n,) each.
         before: how many runs of its folder were before each, (n_runs,).
+        given: what else a rig knows at its points, by the names of FrameVariant.of.
     """
 
     def __init__(self, motions: Sequence[Motion], compiled: dict[Any, Marched]) -> None:
         self.points, self.place = laid_out(motions)
         self._compiled = compiled
         self.before = np.zeros(len(motions))
+        self.given: dict[str, Varying] = {}
 
     @cached_property
     def counts(self) -> Array:
@@ -100,6 +104,7 @@ class RecordedRig:
             "force_rate": lambda: self.per_second(force),
             "per_time": lambda: self.points["per_time"],
             "run": lambda: self.each(self.before),
+            **{name: partial(self.given.__getitem__, name) for name in self.given},
         }
 
     def each(self, numbers: Array) -> Varying:
@@ -173,3 +178,29 @@ class RecordedRig:
             added = variant.reading(marched.at, marched.at["time"])
             self._compiled[key] = marched.define({"force": added}, {})
         return self._compiled[key](self.points, values)["force"]
+
+
+def left_by(added: Callable[[dict[str, Varying]], Varying], travel: Any, rounds: int) -> Varying:
+    """What is added to a travel by the force that it leaves, x = g(D + x), point by point.
+
+    More travel makes more force, and what slips by it is behind: g falls, so that the one x there
+    is lies between 0 and g(D). It is looked for by Newton's steps within what is left of that. The
+    force is that at the speed of the crosshead: what slips takes little of it.
+
+    Args:
+        added: g, from a travel.
+        travel: at all points.
+        rounds: steps.
+    """
+    D, V = travel["D"], travel["D_rate"]
+    one = np.ones(D.value.shape)
+    x = np.zeros(D.value.shape)
+    low, high, slopes = np.full_like(x, -np.inf), np.full_like(x, np.inf), dict[str, Array]()
+    for _ in range(rounds):
+        wanted = added({"D": Varying(D.value + x, {**D.slopes, BY_TRAVEL: one}), "D_rate": V})
+        off, slopes = wanted.value - x, dict(wanted.slopes)
+        low, high = np.where(off > 0.0, x, low), np.where(off < 0.0, x, high)
+        low, high = np.minimum(low, wanted.value), np.maximum(high, wanted.value)
+        steep = 1.0 / (1.0 - np.minimum(slopes.pop(BY_TRAVEL, np.zeros(())), 0.0))
+        x = np.clip(x + off * steep, low, high)
+    return Varying(x, {p: slope * steep for p, slope in slopes.items()})

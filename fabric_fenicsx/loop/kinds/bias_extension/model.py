@@ -116,6 +116,17 @@ class BiasExtension(CrossheadTest):
             return []
         return strip_terms(self._ranges(), self._ends(), goes_back=bool(self._back.any()))
 
+    def _ranges(self) -> dict[str, float]:
+        readings, given = self.readings, self._recorded.given
+        rows = readings.fit & readings.first
+        width, angle = (
+            self._recorded.at_readings(given[name].value)[rows]
+            for name in ("width", "pinned_angle")
+        )
+        per_width = float(np.abs(readings.observed[rows] / width).max())
+        slips = dict.fromkeys(("force_per_width", "largest_force_per_width"), per_width)
+        return {**super()._ranges(), **slips, "pinned_angle": float(np.abs(angle).max())}
+
     @cached_property
     def alike(self) -> frozenset[str]:  # type: ignore[override]
         """Laws of the crossings, where all readings are of one way out at one speed.
@@ -262,6 +273,12 @@ class BiasExtension(CrossheadTest):
             for way, D in zip(first.ways, self._furthest, strict=True)
         ]
         self._mixture = [Part(first, number(1.0))]
+        strip = [strip_of(m, run) for m, run in runs]
+        self._recorded.given = {
+            "width": self._recorded.each(np.array([one.width for one in strip])),
+            "free_length": self._recorded.each(np.array([one.length - one.width for one in strip])),
+            "pinned_angle": Varying(self._recorded_travels.of(first, "middle")),
+        }
         self._reached = reached(first, self._furthest)
         self._reached /= float(self._reached @ first.curve.moments)
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from ...inference.effects import Effect
+from ..picture_frame.rig_terms import STRIP_RIG
 from ..picture_frame.shapes import Ends
 from ..picture_frame.terms import terms
 
@@ -25,6 +26,7 @@ GENERAL_FORMS = {
     "odd_in_rate_moment": "rate_hardening",
     "viscous_moment_of_rate": "rate_hardening",
     "travel_of_displacement": "clamp_slip",
+    "slip_of": "crossover_slip",
     "reading_of_time": "load_drift",
 }
 """Listed effects that are terms with a formula, by what the names of the terms begin with."""
@@ -57,6 +59,6 @@ def strip_terms(
                 effect for name, effect in general.items() if term.name.startswith(name)
             ),
         )
-        for term in terms(ranges, ends)
+        for term in terms(ranges, ends, rig=STRIP_RIG)
         if not term.name.startswith("even")
     ]

@@ -36,7 +36,16 @@ from .shapes import (
 )
 from .variant import FrameVariant
 
-__all__ = ["RIG_VARIABLES", "RigVariable", "of_the_rig", "rig_term", "rig_terms"]
+__all__ = [
+    "RIG",
+    "RIG_VARIABLES",
+    "STRIP_RIG",
+    "Rig",
+    "RigVariable",
+    "of_the_rig",
+    "rig_term",
+    "rig_terms",
+]
 
 #: Most cycles over the range that a periodic term is looked for with.
 CYCLES = {"time": 40.0, "displacement": 16.0, "force": 8.0}
@@ -85,6 +94,11 @@ def _lag(name: str, at: Values) -> Any:
     return at["memory"] - at[name]
 
 
+def _per_width(at: Values) -> Any:
+    """Of a strip that pulls: one that is pushed slips no way back."""
+    return max_value(at["force"], 0) / at["width"]
+
+
 RIG_VARIABLES = {
     name: RigVariable((name,), partial(_itself, name))
     for name in ("displacement", "force", "speed", "acceleration", "force_rate", "time", "run")
@@ -115,11 +129,21 @@ RIG_VARIABLES = {
     "displacement_lag": RigVariable(
         ("displacement", "per_time"), partial(_lag, "displacement"), partial(_mean, "displacement")
     ),
+    "force_per_width": RigVariable(("force", "width"), _per_width),
+    "largest_force_per_width": RigVariable(
+        ("force", "width"),
+        partial(_itself, "memory"),
+        lambda at, past, memory: max_value(past, _per_width(at)),
+    ),
+    "pinned_angle": RigVariable(("pinned_angle",), partial(_itself, "pinned_angle")),
 }
 """By their names; a way is Σ|ΔD|, a mean speed that of its size, and a lag what the mean over the
-last τ differs by from what is now."""
+last τ differs by from what is now. A force per width and a pinned angle are of a strip."""
 
-RIG: dict[str, dict[str, tuple[str, ...]]] = {
+Rig = Mapping[str, Mapping[str, tuple[str, ...]]]
+"""What acts on what of a rig, by which variable, and what that is called in a report."""
+
+RIG: Rig = {
     "reading": {
         "displacement": ("displacement",),
         "force": ("force",),
@@ -144,7 +168,25 @@ RIG: dict[str, dict[str, tuple[str, ...]]] = {
         "run": ("run",),
     },
 }
-"""What acts on the reading and the travel, and what its variable is called in a report."""
+"""Of a picture frame."""
+
+STRIP_RIG: Rig = {
+    "reading": RIG["reading"],
+    "travel": {name: RIG["travel"][name] for name in ("displacement", "force")},
+    "slip": {
+        "force_per_width": ("force",),
+        "largest_force_per_width": ("force",),
+        "pinned_angle": ("angle",),
+    },
+}
+"""Of a strip that is pulled: what slips at its crossings goes by how much longer than wide it is,
+by the force per width, and stays if it goes by the largest so far."""
+
+SLIP_SHAPES = ("linear", "2 coefficients", "3 coefficients", "corner", "saturation")
+"""Of what slips: nothing of it is infinitely steep at no force."""
+
+SLIP_ROUNDS = 3
+"""Steps in which what slips is found with the force that it leaves."""
 
 AGAINST_THE_MOTION = ("displacement", "force", "time", "run")
 """What a friction or a play of the rig may depend on; it has the sign of the speed."""
@@ -166,7 +208,7 @@ LINES = ("force_rate", "force_lag", "displacement_lag")
 
 
 def rig_terms(
-    largest: Mapping[str, float], ends: Ends, specimens: Sequence[int] = ()
+    largest: Mapping[str, float], ends: Ends, specimens: Sequence[int] = (), rig: Rig = RIG
 ) -> Iterator[Effect]:
     """The terms.
 
@@ -174,8 +216,9 @@ def rig_terms(
         largest: sizes of the variables; see terms.ranges_of. There are none by what it has not.
         ends: between which shares of these the signed ones are.
         specimens: of each run; see shapes.each_specimen.
+        rig: what there is to act on.
     """
-    for acts_on, variables in RIG.items():
+    for acts_on, variables in rig.items():
         for variable, reported in variables.items():
             if variable not in largest:
                 continue
@@ -192,6 +235,8 @@ def rig_terms(
                 forms += _forms(acts_on, name, "speed_size", largest, ends)
             yield rig_term(acts_on, name, reported, forms)
     for acts_on, ways in WAYS.items():
+        if "speed" not in rig[acts_on]:
+            continue
         for variable in (v for v in AGAINST_THE_MOTION if v in largest):
             name = f"{acts_on}_of_{variable}_and_direction"
             of_all = (f for w in ways for f in _forms(acts_on, name, variable, largest, ends, w))
@@ -307,7 +352,7 @@ def of_the_rig(
     Args:
         label: what tells it from other forms.
         parameters: its numbers.
-        acts_on: "reading" [N] or "travel" [mm].
+        acts_on: "reading" [N], "travel" [mm], or "slip", a share of a strip's free length.
         variable: one of RIG_VARIABLES.
         added: what is added, from the parameters, the variable and ``also``, if there is one.
         memory: τ of a variable that forgets [s], or the parameter that is one.
@@ -344,7 +389,11 @@ def of_the_rig(
             return size * at["memory"]
         return size * shape_of("sign", (1.0,), at["speed"], width=slow) if turning else size
 
+    def slipped(p: Values, at: Values) -> Any:
+        return -at["free_length"] * whole(p, at)
+
     of = [*kind.of, *(name for other in others for name in other.of)]
+    of += ["free_length"] * (acts_on == "slip")
     of += ["per_time"] * (turning == "over a way")
     return FrameVariant(
         label,
@@ -354,7 +403,8 @@ def of_the_rig(
         remembered=remembered,
         variable=kind.value if kind.remembered is not None else None,
         added_reading=whole if acts_on == "reading" else None,
-        added_travel=whole if acts_on == "travel" else None,
+        added_travel={"travel": whole, "slip": slipped}.get(acts_on),
+        rounds=SLIP_ROUNDS if acts_on == "slip" and "force" in of else 0,
     )
 
 
@@ -427,6 +477,11 @@ def _added(
             rounded = Parameter(f"{name}_width", ROUNDED, SLOW, 2.0)
             yield "rounded sign", {"shape": "sign", "coefficients": one, "width": rounded}
             return
+    if name.startswith("slip"):
+        for label, coefficients, numbers in shapes(name, 4):
+            if label in SLIP_SHAPES:
+                yield label, numbers | {"coefficients": coefficients}
+        return
     constant = _zero(name, turning)
     # Of an acceleration there are few readings.
     seldom = turning in ("kept in a hold", "over a way") or variable == "acceleration"

@@ -146,6 +146,9 @@ X = {
     "largest_force": "largest_force_N",
     "force_lag": "force_lag_N",
     "displacement_lag": "displacement_lag_mm",
+    "force_per_width": "force_per_width_N_mm",
+    "largest_force_per_width": "largest_force_per_width_N_mm",
+    "pinned_angle": "shear_angle_without_slip_rad",
     "run": "runs_before",
 }
 """Variables with their units."""
@@ -156,6 +159,7 @@ Y = {
     "viscous": "moment_per_rate_N_s",
     "reading": "reading_N",
     "travel": "travel_mm",
+    "slip": "share_of_free_length",
 }
 """What a term is a factor of, or adds, with units."""
 

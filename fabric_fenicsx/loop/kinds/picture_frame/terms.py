@@ -17,7 +17,7 @@ from ....mechanics.laws.law import CrossingLaw
 from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ONE_SIDED, ONE_WAY, ShapedLaw
 from ...inference.effects import Effect, Values, valued
 from ..records import FEWEST_BEFORE
-from .rig_terms import rig_terms
+from .rig_terms import RIG, Rig, rig_terms
 from .shapes import (
     FINE,
     FORGETFUL,
@@ -79,8 +79,9 @@ def terms(
     ranges: Mapping[str, float],
     ends: Ends = MappingProxyType({}),
     specimens: Sequence[int] = (),
+    rig: Rig = RIG,
 ) -> list[Effect]:
-    """The terms of a picture frame.
+    """The terms of a picture frame, or of another rig of crossings.
 
     Args:
         ranges: largest size in the fitted readings of "angle", "rate", "path" [rad], "time" [s],
@@ -91,6 +92,7 @@ def terms(
             the next.
         ends: of those that may be negative.
         specimens: of each run of the one folder; see shapes.each_specimen.
+        rig: see rig_terms.
     """
     largest = ranges_of(ranges)
     return [
@@ -98,7 +100,7 @@ def terms(
         *_of_one_way(largest, both_ways(ends)),
         *_flowing(largest),
         *_lagging(largest),
-        *rig_terms(largest, ends, specimens),
+        *rig_terms(largest, ends, specimens, rig),
     ]
 
 

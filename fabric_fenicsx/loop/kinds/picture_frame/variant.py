@@ -30,7 +30,8 @@ class FrameVariant(Variant):
         of: of "time" in the run [s], the crosshead's "displacement" [mm], "speed" [mm/s] and
             "acceleration" [mm/s²], the "force" [N] of the model and its "force_rate" [N/s], and
             "per_time", 1 over the step from the point before [1/s], and "run", how many there were
-            before in its folder.
+            before in its folder; of strips their "width" and "free_length", by which they are
+            longer than wide [mm], and "pinned_angle", that of the middle if nothing slips [rad].
         remembered: what ``added_reading`` and ``added_travel`` find as "memory" among these, from
             the parameters, the others, and its value at the point before; 0 before the first.
         variable: what a term without a formula depends on, from these; by default the first.
@@ -38,6 +39,8 @@ class FrameVariant(Variant):
             "largest_angle"; empty where each run begins anew.
         like: a form whose laws have the same expressions, which serve both.
         of_baseline: parameters of the baseline that ``laws`` needs as well.
+        rounds: steps of Newton's in which ``added_travel`` is found with the force that it leaves;
+            0: with that without it.
         each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
             has. Those of a holdout run can only come from that run: its error is then what is
             left after them.
@@ -56,6 +59,7 @@ class FrameVariant(Variant):
     carried: str = ""
     like: FrameVariant | None = None
     of_baseline: tuple[str, ...] = ()
+    rounds: int = 0
     each_run: bool = False
 
     @property
