@@ -107,7 +107,7 @@ def test_another_law_is_foretold_to_first_order(strip, monkeypatch):
 
 def test_what_strips_say_is_evaluated_once_and_the_same(strip, monkeypatch):
     """Where the crosshead is; a strip that is drawn by less has travels of its own."""
-    (drawn,) = (v for e in strip.effects if e.name == "clamp_slip" for v in e.variants)
+    drawn, *_ = (v for e in strip.effects if e.name == "clamp_slip" for v in e.variants)
     values = VALUES | {drawn.parameters[0].name: 0.1}
     asked = []
     monkeypatch.setattr(Way, "at", lambda *a, at=Way.at, **k: asked.append(a) or at(*a, **k))
@@ -165,7 +165,7 @@ def test_what_slipped_is_not_undone_on_the_way_back():
     columns = {name: exact[name] for name in ("time_s", "displacement_mm", "force_N")}
     run = Run("run.csv", False, "", columns, own={"length_mm": LENGTH, "width_mm": WIDTH})
     test = BiasExtension([measured(run)])
-    (slip,) = (v for e in test.effects if e.name == "crossover_slip" for v in e.variants)
+    slip, *_ = (v for e in test.effects if e.name == "crossover_slip" for v in e.variants)
     values = VALUES | {"slip_1_N": per_force}
     test.settle((slip,), values)
     back = np.arange(57) > 28
@@ -185,7 +185,7 @@ def test_what_slipped_holds_while_the_crosshead_stands():
     columns = {name: exact[name] for name in ("time_s", "displacement_mm", "force_N")}
     run = Run("run.csv", False, "", columns, own={"length_mm": LENGTH, "width_mm": WIDTH})
     test = BiasExtension([measured(run)])
-    (slip,) = (v for e in test.effects if e.name == "crossover_slip" for v in e.variants)
+    slip, *_ = (v for e in test.effects if e.name == "crossover_slip" for v in e.variants)
     values = VALUES | {"c1_N_s": 0.05, "slip_1_N": per_force}
     test.settle((slip,), values)
     force, angle = test.predict((slip,), values)[0], test.middle_angle((slip,), values)
@@ -245,7 +245,7 @@ def test_slopes_are_differences(effect, label, monkeypatch):
 def test_where_a_fit_ends_the_strip_is_solved():
     """Slip and the crossings' curve together, in forces and angles; before, slip by itself."""
     test = BiasExtension([with_angles(measured(pulled(force=np.linspace(0.0, 20.0, 29))))])
-    (slip,) = (v for e in test.effects if e.name == "crossover_slip" for v in e.variants)
+    slip, *_ = (v for e in test.effects if e.name == "crossover_slip" for v in e.variants)
     values = VALUES | {"slip_1_N": 2.0}
     exact, path = by_the_net(pulled(), keys_of(VALUES) | slip.changes(2.0))
     angle = np.degrees(np.interp(pulled().columns["displacement_mm"], path.travel, path.middle))
@@ -298,7 +298,7 @@ def test_slip_begins_where_forces_are_though_none_was_read():
     alone = BiasExtension([with_angles(measured(pulled(force=np.full(29, np.nan))))])
     first = alone.curve
     path = solved_strip(strip_case(measured(pulled()), pulled(), TRAVEL, 1.0, {}), first)
-    (slip,) = (v for e in alone.effects if e.name == "crossover_slip" for v in e.variants)
+    slip, *_ = (v for e in alone.effects if e.name == "crossover_slip" for v in e.variants)
     on_a_tow = path.force[-1] / WIDTH * 5.0
     assert slip.parameters[0].starts[0] * on_a_tow == pytest.approx(1.0, rel=0.05)
     assert slip.solved_at[-1] * on_a_tow == pytest.approx(20.0, rel=0.05)

@@ -21,8 +21,9 @@ class Parameter:
         share_of: "duration", "angle", "rate" or "travel": starts and bounds are shares of the
             longest run, or of the largest shear angle, rate or displacement in the data;
             "typical_rate": of the median rate; "force": of the largest reading; of a strip that is
-            pulled "per_tow_force": of one over the largest force on a tow; of a
-            cantilever "curvature" or "moment", the largest of them in the fitted baseline.
+            pulled "per_tow_force" and "per_width_force": of one over the largest force on a tow
+            and per width, "force_per_width": of the latter; of a cantilever "curvature" or
+            "moment", the largest of them in the fitted baseline.
         jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
             for on both sides.
         of_model: whether it says which model of the rig is nearer, and nothing of the fabric: the

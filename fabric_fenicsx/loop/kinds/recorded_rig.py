@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 
 #: Name of the derivative by the travel, beside those by parameters.
 BY_TRAVEL = "travel"
+#: Share of what was off before that is too much of it.
+LITTLE_NEARER = 0.5
 #: Readings of a run that tell nothing of an acceleration.
 FEWEST = 3
 
@@ -184,8 +186,9 @@ def left_by(added: Callable[[dict[str, Varying]], Varying], travel: Any, rounds:
     """What is added to a travel by the force that it leaves, x = g(D + x), point by point.
 
     More travel makes more force, and what slips by it is behind: g falls, so that the one x there
-    is lies between 0 and g(D). It is looked for by Newton's steps within what is left of that. The
-    force is that at the speed of the crosshead: what slips takes little of it.
+    is lies between any x and its g. It is looked for by Newton's steps, and half-way between what
+    is left where these lead out of that or get little nearer. The force is that at the speed of the
+    crosshead: what slips takes little of it.
 
     Args:
         added: g, from a travel.
@@ -195,12 +198,16 @@ def left_by(added: Callable[[dict[str, Varying]], Varying], travel: Any, rounds:
     D, V = travel["D"], travel["D_rate"]
     one = np.ones(D.value.shape)
     x = np.zeros(D.value.shape)
-    low, high, slopes = np.full_like(x, -np.inf), np.full_like(x, np.inf), dict[str, Array]()
+    low, high, before = (np.full_like(x, value) for value in (-np.inf, np.inf, np.inf))
+    slopes: dict[str, Array] = {}
     for _ in range(rounds):
         wanted = added({"D": Varying(D.value + x, {**D.slopes, BY_TRAVEL: one}), "D_rate": V})
         off, slopes = wanted.value - x, dict(wanted.slopes)
-        low, high = np.where(off > 0.0, x, low), np.where(off < 0.0, x, high)
-        low, high = np.minimum(low, wanted.value), np.maximum(high, wanted.value)
+        low = np.maximum(low, np.minimum(x, wanted.value))
+        high = np.minimum(high, np.maximum(x, wanted.value))
         steep = 1.0 / (1.0 - np.minimum(slopes.pop(BY_TRAVEL, np.zeros(())), 0.0))
-        x = np.clip(x + off * steep, low, high)
+        x = x + off * steep
+        far = np.abs(off) > LITTLE_NEARER * before
+        x = np.where((x <= low) | (x >= high) | far, 0.5 * (low + high), x)
+        before = np.abs(off)
     return Varying(x, {p: slope * steep for p, slope in slopes.items()})

@@ -316,7 +316,7 @@ class BiasExtension(CrossheadTest):
         ]
 
     def _more_shares(self) -> dict[str, float]:
-        """One over the largest force on a tow of the clamps [1/N], and per width of them [mm/N].
+        """The largest force per width [N/mm]; one over it, and over that on a tow of the clamps.
 
         Where none has been read, of strips that are to be made up or whose angles alone were read,
         it is that of the strips that were solved first.
@@ -329,7 +329,11 @@ class BiasExtension(CrossheadTest):
         per_tow = [
             w * m.fabric.tow_spacing_mm for w, (m, _, _) in zip(per_width, forces, strict=True)
         ]
-        return {"per_tow_force": 1.0 / max(per_tow), "per_width_force": 1.0 / max(per_width)}
+        return {
+            "per_tow_force": 1.0 / max(per_tow),
+            "per_width_force": 1.0 / max(per_width),
+            "force_per_width": max(per_width),
+        }
 
     def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
         found = super()._scaled(effect, shares)

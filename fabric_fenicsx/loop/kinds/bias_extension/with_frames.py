@@ -33,6 +33,7 @@ from ...measurement.schema import Measurement
 from ..picture_frame.model import PictureFrame
 from ..picture_frame.variant import FrameVariant
 from .centred import CentredBiasExtension
+from .effects import StripPullVariant
 from .frame_law import FRAME_SHARE, in_thirds, locking, locking_variant
 from .model import BiasExtension
 from .settling import Settled, Settling, left_out
@@ -202,13 +203,15 @@ def _models(
     other one. Of what nothing is left in the end is no model of its own.
     """
     own = [e for e in anew.effects if e.name in LENGTHENING and (names is None or e.name in names)]
+    # Those that the strips are solved with.
+    forms_of = {e: [v for v in e.variants if isinstance(v, StripPullVariant)] for e in own}
     found: dict[tuple[Effect, ...], Settled] = {}
     for count in range(len(own) + 1):
         for effects in combinations(own, count):
             singles = [found[(e,)] for e in effects if (e,) in found]
             sets: list[tuple[tuple[Variant, ...], Mapping[str, float] | None]] = []
             if count < 2:
-                sets += [((form, *v), None) for v in product(*(e.variants for e in effects))]
+                sets += [((form, *v), None) for v in product(*(forms_of[e] for e in effects))]
             elif len(singles) == count:
                 better, other = (one.fit for one in sorted(singles, key=_objective))
                 (little,) = other.variants[-1].parameters

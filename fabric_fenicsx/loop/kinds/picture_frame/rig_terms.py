@@ -404,7 +404,7 @@ def of_the_rig(
         variable=kind.value if kind.remembered is not None else None,
         added_reading=whole if acts_on == "reading" else None,
         added_travel={"travel": whole, "slip": slipped}.get(acts_on),
-        rounds=SLIP_ROUNDS if acts_on == "slip" and "force" in of else 0,
+        rounds=SLIP_ROUNDS if "width" in of else 0,
     )
 
 
