@@ -329,17 +329,12 @@ class CrossheadTest:
         mine = [v for v in variants if isinstance(v, FrameVariant)]
         travels = [v for v in mine if v.travel is not None]
         travel = self._recorded.travel(travels[0] if travels else None, values)
-        whole = self._force(travel, mine, values)
-        for v in mine:
-            if v.added_travel is None:
-                continue
-            if v.rounds == 0:
-                # The force with the travel as it would be without: what is added is little.
-                ahead = self._recorded.added(v, "travel", self._acting(whole), values)
-            else:
-                ahead = left_by(partial(self._added_travel, v, mine, values), travel, v.rounds)
+        for v in (v for v in mine if v.added_travel is not None):
+            # What is little goes by the force with the travel as it would be without.
+            added = partial(self._added_travel, v, mine, values)
+            ahead = left_by(added, travel, v.rounds) if v.rounds else added(travel)
             travel = self._recorded.moved(travel, ahead)
-            whole = self._force(travel, mine, values)
+        whole = self._force(travel, mine, values)
         zeros: list[tuple[Flags, Array]] = []
         cell = Varying(np.asarray(self._on_the_load_cell))
         read = whole

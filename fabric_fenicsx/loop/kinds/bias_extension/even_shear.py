@@ -60,6 +60,8 @@ class EvenZones:
 
     def __init__(self, strips: Sequence[BiasStrip]) -> None:
         self._strips = list(strips)
+        #: The last travel that was asked for, most often the recorded one, and its angle.
+        self._last: tuple[Varying, tuple[Varying, Varying]] | None = None
         #: Of fabric [mm²], (n_runs, ZONES).
         self.areas = np.array([strip.areas() for strip in strips])
 
@@ -71,8 +73,10 @@ class EvenZones:
             travels: of all runs.
             D: the same [mm], (n_points, n_runs).
         """
-        pinned = self._of_travel(D)
-        lever = self.lever(pinned)
+        if self._last is None or self._last[0] is not D:
+            gamma = self._of_travel(D)
+            self._last = D, (gamma, self.lever(gamma))
+        pinned, lever = self._last[1]
         if len(parts) == 1:
             return pinned, lever
         alone = [Part(parts[0].solved, number(1.0))]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -40,7 +41,7 @@ Flags = npt.NDArray[np.bool_]
 Name = Literal["gamma", "lever", "rest", "middle"]
 
 #: Groups of crossings that go alike.
-GROUPS = 24
+GROUPS = 16
 #: Share of the work by which a curve may differ from the one that a strip was solved with.
 NEAR = 0.35
 #: How often a strip is solved anew, at most, for each kind of motion.
@@ -123,27 +124,24 @@ class Way:
         return np.asarray(self.at("rest", D, phase) + work.sum(axis=1))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Solved:
     """The strips of all runs, solved with one curve.
 
     Attributes:
         curve: of their crossings.
         ways: of each run.
-        passed: angles of all groups at some travels of all runs, out and back [rad], (n,).
-        weight: A dγ/dD there, (n,).
-        rate: dγ/dt there [rad/s], (n,).
+        by_moments: A dγ/dD of all groups at some travels of all runs, out and back, times what
+            each moment at KNOTS counts for there, straight between them, (n, n_knots).
+        by_dashpot: A dγ/dD dγ/dt there, (n,).
         out: how many of them are on the way out; the others are on the way back.
-        work: the weight times the curve's moments, (n,).
     """
 
     curve: Curve
     ways: tuple[Way, ...]
-    passed: Array
-    weight: Array
-    rate: Array
+    by_moments: Array
+    by_dashpot: Array
     out: int
-    work: Array
 
     @classmethod
     def along(cls, curve: Curve, ways: Sequence[Way], furthest: Array) -> Solved:
@@ -155,15 +153,29 @@ class Solved:
             np.concatenate([(by(way) * way.gamma(D, 1)).ravel() for way, D in every])
             for by in (attrgetter("area"), attrgetter("speed"))
         )
+        units = [np.interp(np.abs(passed), np.radians(KNOTS), one) for one in np.eye(len(KNOTS))]
+        by_moments = np.stack([np.sign(passed) * weight * unit for unit in units], axis=1)
         out = TRAVELS * GROUPS * len(ways)
-        work = weight * _moments(curve, passed, rate, out)
-        return cls(curve, tuple(ways), passed, weight, rate, out, work)
+        return cls(curve, tuple(ways), by_moments, weight * rate, out)
 
     def apart(self, curve: Curve) -> float:
         """By how much of its work a curve differs from the one that strips were solved with."""
-        mine = self.weight * _moments(curve, self.passed, self.rate, self.out)
+        mine = self._work(curve)
         total = float(np.abs(mine).sum())
-        return float(np.abs(mine - self.work).sum()) / max(total, 1e-300)
+        return float(np.abs(mine - self._own_work).sum()) / max(total, 1e-300)
+
+    def _work(self, curve: Curve) -> Array:
+        ways = (slice(self.out), curve), (slice(self.out, None), curve.back or curve)
+        return np.concatenate(
+            [
+                self.by_moments[rows] @ np.array(of.moments) + of.dashpot * self.by_dashpot[rows]
+                for rows, of in ways
+            ]
+        )
+
+    @cached_property
+    def _own_work(self) -> Array:
+        return self._work(self.curve)
 
 
 class SolvedStrips:
@@ -368,17 +380,6 @@ class SolvedStrips:
     def _of_alike(self, run: int, path: StripPath) -> npt.NDArray[np.int64]:
         """Groups of a run's crossings, the same for all of its paths."""
         return self._groups.setdefault(run, _alike(path))
-
-
-def _moments(curve: Curve, gamma: Array, rate: Array, out: int) -> Array:
-    """Of a curve at angles, so many on the way out and the others on the way back, (n,)."""
-    way_out, way_back = slice(out), slice(out, None)
-    return np.concatenate(
-        [
-            curve(gamma[way_out], rate[way_out]),
-            (curve.back or curve)(gamma[way_back], rate[way_back]),
-        ]
-    )
 
 
 def reached(solved: Solved, furthest: Array) -> Array:
