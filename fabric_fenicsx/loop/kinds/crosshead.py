@@ -331,8 +331,8 @@ class CrossheadTest:
         travel = self._recorded.travel(travels[0] if travels else None, values)
         for v in (v for v in mine if v.added_travel is not None):
             # What is little goes by the force with the travel as it would be without.
-            added = partial(self._added_travel, v, mine, values)
-            ahead = left_by(added, travel, v.rounds) if v.rounds else added(travel)
+            by_force = partial(self._added_travel, v, mine, values)
+            ahead = left_by(by_force, travel, v.rounds) if v.rounds else by_force(travel)
             travel = self._recorded.moved(travel, ahead)
         whole = self._force(travel, mine, values)
         zeros: list[tuple[Flags, Array]] = []
