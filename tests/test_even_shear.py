@@ -16,6 +16,7 @@ from fabric_fenicsx.loop.inference.models import Models
 from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig
 from fabric_fenicsx.loop.kinds.bias_extension.even_shear import EVEN
 from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
+from fabric_fenicsx.loop.kinds.bias_extension.proposals import proposals
 from fabric_fenicsx.loop.kinds.bias_extension.quantities import coarser
 from fabric_fenicsx.loop.kinds.bias_extension.strip import strip_case
 from fabric_fenicsx.loop.kinds.recorded_rig import left_by
@@ -214,6 +215,12 @@ def test_there_is_no_share_where_nothing_tells_it():
     assert not share_of(replace(runs[0], columns=blind), runs[1])
     # Nor where the formula is not known.
     assert not share_of(made_up((76.0, 40.0), 0))
+
+
+def test_a_picture_frame_of_the_fabric_knows_no_share():
+    *_, frame = proposals([measured(made_up(SIZES[0], 0), made_up(SIZES[1], 1))])
+    force, slopes = frame.model([frame.measurement]).predict((), {**LAW, EVEN.name: 0.7})
+    assert force.any() and not slopes[EVEN.name].any() and slopes["k1_N"].any()
 
 
 def test_fine_nets_are_solved_coarser_where_the_share_makes_up_for_it():

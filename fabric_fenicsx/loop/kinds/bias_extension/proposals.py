@@ -50,8 +50,7 @@ class OfTheFabric(PictureFrame):
         """Crosshead forces [N], of laws of the crossings alone; see CrossheadTest."""
         laws = [v for v in variants if isinstance(v, FrameVariant) and v.laws is not None]
         force, slopes = super().predict(laws, values, deviations)
-        others = {p.name: np.zeros_like(force) for v in variants for p in v.parameters}
-        return force, others | slopes
+        return force, {name: np.zeros_like(force) for name in values} | slopes
 
 
 def proposals(measurements: Sequence[Measurement]) -> list[Proposal]:
