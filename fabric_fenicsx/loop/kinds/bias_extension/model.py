@@ -34,12 +34,12 @@ from ..drape.shear_field import hermite_weights
 from ..picture_frame.model import SAME_RATE
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
-from ..records import shifted
 from .curves import Moment, at_knots, at_knots_back
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
-from .even_shear import EVEN, SHARES, ZONES, EvenZones, beside, in_zones, of_both
+from .even_shear import EVEN, EvenZones, of_both
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
-from .mixture import Part, Travels, number, of_groups, of_ways
+from .going import columns_of, gone
+from .mixture import Part, Travels, number, of_ways
 from .phases import GONE_BACK, Phase, backward, moving, phases_of, speed_out
 from .quantities import coarser, first_curve, read_together, strip_of
 from .settled import Correction, Quantity, correction
@@ -250,13 +250,7 @@ class BiasExtension(CrossheadTest):
             self.baseline = (*self.baseline, EVEN)
         even = self._even is not None
         spaced = np.array([coarser(m, run) if even else 1.0 for m, run in runs])
-        # Of the curve that laws with memory and dashpots follow, the same throughout.
-        angles = [
-            strip_of(m, run).angle(0.5 * D)
-            for (m, run), D in zip(runs, self._furthest, strict=True)
-        ]
-        rates = 2.0 * np.array(angles) / self._furthest * speed[self._parent]
-        self._typical_rate = float(np.nanmedian(rates))
+        self._typical_rate = self._half_way(speed[self._parent])
         like = self._like
         paths = {} if like is None else like._strips.paths
         strips = self._furthest, self._speed, back, stops, spaced
@@ -273,14 +267,23 @@ class BiasExtension(CrossheadTest):
             for way, D in zip(first.ways, self._furthest, strict=True)
         ]
         self._mixture = [Part(first, number(1.0))]
-        strip = [strip_of(m, run) for m, run in runs]
+        length, width = np.array([(s.length, s.width) for s in (strip_of(*one) for one in runs)]).T
         self._recorded.given = {
-            "width": self._recorded.each(np.array([one.width for one in strip])),
-            "free_length": self._recorded.each(np.array([one.length - one.width for one in strip])),
+            "width": self._recorded.each(width),
+            "free_length": self._recorded.each(length - width),
             "pinned_angle": Varying(self._recorded_travels.of(first, "middle")),
         }
         self._reached = reached(first, self._furthest)
         self._reached /= float(self._reached @ first.curve.moments)
+
+    def _half_way(self, speed: Array) -> float:
+        """A rate [rad/s] of the middle, half-way out at the runs' speeds [mm/s].
+
+        That of the curve which laws with memory and dashpots follow, the same throughout.
+        """
+        pairs = zip(self._runs, self._furthest, strict=True)
+        angles = np.array([strip_of(m, run).angle(0.5 * D) for (m, run), D in pairs])
+        return float(np.nanmedian(2.0 * angles / self._furthest * speed))
 
     def _named(self, readings: Readings) -> Readings:
         along = {"displacement [mm]": self._recorded.at_readings(self._points["D"].value)}
@@ -467,12 +470,7 @@ class BiasExtension(CrossheadTest):
 
     @cached_property
     def _counts(self) -> Array:
-        return np.repeat(self._recorded.counts[self._going_runs], self._columns)
-
-    @property
-    def _columns(self) -> int:
-        """Of each run that goes its own way: groups of its crossings, and zones that are even."""
-        return GROUPS if self._even is None else GROUPS + ZONES
+        return np.repeat(self._recorded.counts[self._going_runs], columns_of(self._even))
 
     def _gathered(self, values: Array) -> Array:
         return np.asarray(self._in_groups(values).sum(axis=2))[:, self._goes_as]
@@ -482,7 +480,7 @@ class BiasExtension(CrossheadTest):
 
     def _in_groups(self, values: Array) -> Array:
         """Of the crossings of each run that goes its own way, (n_points, n, n_columns)."""
-        return values.reshape(len(values), len(self._going_runs), self._columns)
+        return values.reshape(len(values), len(self._going_runs), columns_of(self._even))
 
     def _travels(self, D: Varying) -> Travels:
         """Travels of a model; most have those of the crossheads."""
@@ -507,42 +505,8 @@ class BiasExtension(CrossheadTest):
 
     def _going(self, parts: Sequence[Part], D: Varying, speed: Varying) -> dict[str, Varying]:
         """How the crossings of solved strips go at some travels; see _kinematics."""
-        ways, runs = parts[0].solved.ways, self._going_runs
-        area = np.concatenate([ways[r].area for r in runs])
-        travels = self._travels(D)
-
-        def each(values: Array, columns: int = self._columns) -> Array:
-            """Of those runs, in each of their columns."""
-            return np.repeat(np.broadcast_to(values, D.value.shape)[:, runs], columns, axis=1)
-
-        along = {p: each(slope, GROUPS) for p, slope in D.slopes.items()}
-        pace = Varying(each(speed.value), {p: each(slope) for p, slope in speed.slopes.items()})
-        gamma = of_groups(parts, travels, "gamma", along)
-        lever = of_groups(parts, travels, "lever", along)
-        factor = Varying(area) * lever
-        if self._even is not None:
-            zone, zone_lever = self._even.angle(parts, travels, D)
-            own, count = self._of_going, len(runs)
-            gamma = beside(gamma, in_zones(own(zone), SHARES), count)
-            lever = beside(lever, in_zones(own(zone_lever), SHARES), count)
-            weighed = SHARES * self._even.areas[runs]
-            factor = beside(factor, in_zones(own(self._even.lever(zone)), weighed), count)
-        return {
-            "gamma": gamma,
-            "gamma_n": Varying(
-                shifted(gamma.value), {p: shifted(s) for p, s in gamma.slopes.items()}
-            ),
-            "rate": lever * pace,
-            "per_time": Varying(each(self._points["per_time"].value)),
-            "rate_per_speed": lever,
-            "factor": factor,
-        }
-
-    def _of_going(self, of_runs: Varying) -> Varying:
-        """Of those runs that go their own way, (n_points, n)."""
-        shape, runs = of_runs.value.shape, self._going_runs
-        slopes = {p: np.broadcast_to(s, shape)[:, runs] for p, s in of_runs.slopes.items()}
-        return Varying(of_runs.value[:, runs], slopes)
+        motion = {"D": D, "D_rate": speed, "per_time": self._points["per_time"]}
+        return gone(parts, self._travels(D), motion, self._going_runs, self._even)
 
     def _force(
         self, travel: Any, variants: Sequence[FrameVariant], values: Mapping[str, float]
