@@ -59,8 +59,9 @@ PACE = 1.5
 DASHPOT = "c1_N_s"
 #: Share by which a curve, a slip or a crimp may differ from those that a fit was solved with.
 SETTLED = 0.02
-#: Share of what strips are solved at below which an effect is none; share of a net that is none.
-SLIGHT = 1e-3
+#: Share of what strips are solved at below which an effect is none; share of a net of which
+#: corrections by a few per cent are not worth a solve.
+SLIGHT, LITTLE_NET = 1e-3, 0.05
 #: Sets of strips of which it is kept how their crossings go.
 MOTIONS = 8
 #: Shares of even shear that fits may begin with.
@@ -358,16 +359,16 @@ class BiasExtension(CrossheadTest):
 
         From then on its forces and angles are corrected by what they were off by there: exactly
         right at that place, their derivatives as before. Strips that stop before their end leave
-        them as they are.
+        them as they are, and so do those that all but wholly shear evenly.
         """
+        if self._of_net(values).value < LITTLE_NET:
+            return
         key = solved_by(variants)
         changes: dict[str, Any] = {}
         for v in variants:
             if isinstance(v, StripPullVariant) and v.changes is not None:
                 value = values[v.parameters[0].name]
                 changes |= v.changes(value) if value > SLIGHT * v.solved_at[0] else {}
-        if not changes and self._of_net(values).value < SLIGHT:
-            return
         curve = self._curve(variants, values, self._moments(variants, values).value)
         if key in self._settled:
             known, with_these = self._settled[key]
