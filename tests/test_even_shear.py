@@ -223,6 +223,16 @@ def test_a_picture_frame_of_the_fabric_knows_no_share():
     assert force.any() and not slopes[EVEN.name].any() and slopes["k1_N"].any()
 
 
+def test_of_a_net_of_which_little_is_left_nothing_is_solved_anew(strips):
+    before = strips._strips.count
+    strips.settle((), {**LAW, EVEN.name: 0.97})
+    assert strips._strips.count == before
+    net = BiasExtension([measured(made_up(SIZES[0], 0), made_up(SIZES[1], 1))], like=strips)
+    before = net._strips.count
+    net.settle((), {**LAW, EVEN.name: 0.5})
+    assert net._strips.count == before + 1
+
+
 def test_fine_nets_are_solved_coarser_where_the_share_makes_up_for_it():
     run = made_up(SIZES[0])
     fine, wide = measured(run, spacing=1.5), measured(run, spacing=9.0)
