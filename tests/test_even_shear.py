@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 from fabric_fenicsx.loop.expressions.marching import Varying
 from fabric_fenicsx.loop.inference.models import Models
+from fabric_fenicsx.loop.kinds import crosshead
 from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig
 from fabric_fenicsx.loop.kinds.bias_extension.even_shear import EVEN
 from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
@@ -184,6 +185,36 @@ def test_what_slips_in_series_is_what_the_force_that_it_leaves_makes_of_it():
 def still(length, width, D, law):
     """The force where nothing moves."""
     return force(length, width, angle(length, width, D), 0.0, law)
+
+
+def test_what_slips_is_looked_for_once_beside_next_to_nothing_of_other_forms(strips, monkeypatch):
+    """Thousands of forms are looked at beside a model that slips."""
+    (slip,) = (v for v in forms(strips, "crossover_slip") if v.label.startswith("of the strip"))
+    friction, *_ = forms(strips, "crossover_friction")
+    values = {**LAW, EVEN.name: 0.6, "slip_mm_N": 0.5, "slip_from_N_mm": 0.01}
+    values |= {p.name: p.starts[0] for p in friction.parameters if p.starts}
+    (amount,) = (p.name for p in friction.amplitudes)
+    asked = []
+    monkeypatch.setattr(
+        crosshead, "left_by", lambda *a, f=crosshead.left_by: asked.append(a) or f(*a)
+    )
+    alone, slopes = strips.predict([slip], values)
+    beside, more = strips.predict([slip, friction], {**values, amount: 1e-9})
+    assert len(asked) == 1
+    assert beside == pytest.approx(alone, rel=1e-6)
+    assert all(more[name] == pytest.approx(slope, abs=1e-5) for name, slope in slopes.items())
+    little = 1e-4
+    some, _ = strips.predict([slip, friction], {**values, amount: little})
+    assert len(asked) == 2
+    # What slips by it is left out of its slope.
+    by, change = (
+        more[amount][strips.readings.first],
+        ((some - alone) / little)[strips.readings.first],
+    )
+    assert by @ change > 0.98 * np.linalg.norm(by) * np.linalg.norm(change)
+    assert 0.6 < np.linalg.norm(change) / np.linalg.norm(by) <= 1.05
+    strips.predict([slip], {**values, "k1_N": 0.031})
+    assert len(asked) == 3
 
 
 def test_what_a_force_leaves_is_found_where_it_falls_steeply():

@@ -27,6 +27,7 @@ from ...mechanics.laws.springs import PolynomialSpring
 from ..expressions.marching import MOST_KEPT, Marched, Varying, spread
 from ..inference.effects import Effect, Variant, of_each, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
+from ..inference.first_order import SMALL
 from ..inference.noise import estimated_noise
 from ..kept import Kept
 from ..measurement.readings import common_noise, readings_of
@@ -47,6 +48,8 @@ BASELINE = (
     Parameter("c1_N_s", (0.0,), 0.0, meaning="dashpot, moment per area and rate"),
 )
 
+#: Models of which it is kept what slipped.
+SLIPS = 4
 #: Share of the largest size below which a reading on the other side of 0 is none.
 LITTLE = 0.05
 
@@ -84,6 +87,8 @@ class CrossheadTest:
         #: Angles and rates of a rig that follows the crosshead, and the moments last made of them.
         self._still: dict[str, Varying] | None = None
         self._kept_moments: Kept[Varying] = Kept(MOST_KEPT)
+        #: What forms that slip added to the travel, beside which forms with which parameters.
+        self._slips: dict[FrameVariant, list[tuple[Any, dict[str, float], Varying]]] = {}
         self._recorded = RecordedRig(motions, self._compiled)
         self._points = self._recorded.points
         self._set_up(runs)
@@ -330,10 +335,7 @@ class CrossheadTest:
         travels = [v for v in mine if v.travel is not None]
         travel = self._recorded.travel(travels[0] if travels else None, values)
         for v in (v for v in mine if v.added_travel is not None):
-            # What is little goes by the force with the travel as it would be without.
-            by_force = partial(self._added_travel, v, mine, values)
-            ahead = left_by(by_force, travel, v.rounds) if v.rounds else by_force(travel)
-            travel = self._recorded.moved(travel, ahead)
+            travel = self._recorded.moved(travel, self._ahead(v, travel, mine, values))
         whole = self._force(travel, mine, values)
         zeros: list[tuple[Flags, Array]] = []
         cell = Varying(np.asarray(self._on_the_load_cell))
@@ -360,6 +362,39 @@ class CrossheadTest:
                 found[name] = slope.copy()
                 found[name][rows] -= J @ np.linalg.lstsq(J, slope[rows], rcond=None)[0]
         return self._recorded.at_readings(force), found
+
+    def _ahead(
+        self,
+        variant: FrameVariant,
+        travel: Any,
+        variants: Sequence[FrameVariant],
+        values: Mapping[str, float],
+    ) -> Varying:
+        """What a form adds to the travel [mm].
+
+        What is little goes by the force with the travel as it would be without. Otherwise it takes
+        several, and is kept: beside next to nothing of thousands of other forms it is the same, and
+        what these would have to do with it is left to where there is more of them.
+        """
+        added = partial(self._added_travel, variant, variants, values)
+        if not variant.rounds:
+            return added(travel)
+        for forms, numbers, known in self._slips.get(variant, ()):
+            others = [v for v in variants if v not in forms]
+            same = len(others) + len(forms) == len(variants)
+            if (
+                same
+                and all(v.travel is None and v.added_travel is None for v in others)
+                and all(abs(values[p.name]) <= SMALL for v in others for p in v.amplitudes)
+                and all(values[name] == number for name, number in numbers.items())
+            ):
+                return known
+        found = left_by(added, travel, variant.rounds)
+        names = [p.name for p in (*self.baseline, *(p for v in variants for p in v.parameters))]
+        numbers = {name: values[name] for name in names if name in values}
+        before = [one for one in self._slips.get(variant, ()) if one[0] != tuple(variants)]
+        self._slips[variant] = [(tuple(variants), numbers, found), *before[: SLIPS - 1]]
+        return found
 
     def _added_travel(
         self,
