@@ -220,13 +220,13 @@ def test_what_slips_is_looked_for_once_beside_next_to_nothing_of_other_forms(str
 def test_what_a_force_leaves_is_found_where_it_falls_steeply():
     D = Varying(np.linspace(0.0, 2.0, 9)[:, None])
 
-    def added(travel):
+    def added(travel, by):
         x = travel["D"]
         force = np.maximum(x.value, 0.0) ** 3
         slope = 3.0 * np.maximum(x.value, 0.0) ** 2
         behind = -np.tanh(5.0 * force)
-        by = -5.0 / np.cosh(5.0 * force) ** 2 * slope
-        return Varying(behind, {p: by * s for p, s in x.slopes.items()} | {"a": behind})
+        steep = -5.0 / np.cosh(5.0 * force) ** 2 * slope
+        return Varying(behind, {p: steep * s for p, s in x.slopes.items()} | {"a": behind})
 
     found = left_by(added, {"D": D, "D_rate": D}, 12)
     exact = [

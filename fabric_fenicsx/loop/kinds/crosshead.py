@@ -10,7 +10,7 @@ The laws are those of mechanics.laws, the same classes that a whole net takes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from math import inf
@@ -402,21 +402,38 @@ class CrossheadTest:
         variants: Sequence[FrameVariant],
         values: Mapping[str, float],
         travel: Any,
+        by: Collection[str] | None = None,
     ) -> Varying:
-        """What a form adds to the travel [mm] by the force at a travel."""
-        force = self._acting(self._force(travel, variants, values))
+        """What a form adds to the travel [mm] by the force at a travel; see _force."""
+        force = self._acting(self._force(travel, variants, values, by))
         return self._recorded.added(variant, "travel", force, values)
 
     def _force(
-        self, travel: Any, variants: Sequence[FrameVariant], values: Mapping[str, float]
+        self,
+        travel: Any,
+        variants: Sequence[FrameVariant],
+        values: Mapping[str, float],
+        by: Collection[str] | None = None,
     ) -> Varying:
-        """Force [N] that the moments of the crossings make, (n_points, n_runs)."""
+        """Force [N] that the moments of the crossings make, (n_points, n_runs).
+
+        Args:
+            travel: at all points.
+            variants: of the model.
+            values: of its parameters.
+            by: derivatives that are wanted; by default all there are.
+        """
         known = self._kinematics(travel, values)
         moment = self._moment(None, known, values)
         for v in variants:
             if v.laws is not None:
                 moment += self._moment(v, known, values)
         factor = known["factor"]
+        if by is not None:
+            moment, factor = (
+                Varying(one.value, {p: one.slopes[p] for p in one.slopes if p in by})
+                for one in (moment, factor)
+            )
         work, shape = moment * factor, factor.value.shape
         return Varying(
             self._gathered(work.value),

@@ -182,7 +182,7 @@ class RecordedRig:
         return self._compiled[key](self.points, values)["force"]
 
 
-def left_by(added: Callable[[dict[str, Varying]], Varying], travel: Any, rounds: int) -> Varying:
+def left_by(added: Callable[..., Varying], travel: Any, rounds: int) -> Varying:
     """What is added to a travel by the force that it leaves, x = g(D + x), point by point.
 
     More travel makes more force, and what slips by it is behind: g falls, so that the one x there
@@ -191,7 +191,7 @@ def left_by(added: Callable[[dict[str, Varying]], Varying], travel: Any, rounds:
     crosshead: what slips takes little of it.
 
     Args:
-        added: g, from a travel.
+        added: g, from a travel and names of the derivatives that are wanted of it; None: all.
         travel: at all points.
         rounds: steps.
     """
@@ -200,8 +200,9 @@ def left_by(added: Callable[[dict[str, Varying]], Varying], travel: Any, rounds:
     x = np.zeros(D.value.shape)
     low, high, before = (np.full_like(x, value) for value in (-np.inf, np.inf, np.inf))
     slopes: dict[str, Array] = {}
-    for _ in range(rounds):
-        wanted = added({"D": Varying(D.value + x, {**D.slopes, BY_TRAVEL: one}), "D_rate": V})
+    for k in range(rounds):
+        there = {"D": Varying(D.value + x, {**D.slopes, BY_TRAVEL: one}), "D_rate": V}
+        wanted = added(there, None if k == rounds - 1 else (BY_TRAVEL,))
         off, slopes = wanted.value - x, dict(wanted.slopes)
         low = np.maximum(low, np.minimum(x, wanted.value))
         high = np.minimum(high, np.maximum(x, wanted.value))

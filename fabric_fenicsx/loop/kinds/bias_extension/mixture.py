@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ...expressions.marching import Varying
 from ...kept import Kept
-from .phases import Phases
+from .phases import Phase, Phases
 from .solved import GROUPS, Name, Solved
 
 __all__ = ["Part", "Travels", "number", "of_groups", "of_ways"]
@@ -63,6 +63,7 @@ class Travels:
         kept: bool = False,
     ) -> None:
         self._D, self._phase = D, phase
+        self._stops = bool((phase == Phase.STOPPED).any())
         self._runs = range(D.shape[1]) if of is None else of
         most = min(KEPT, MOST_NUMBERS // max(D.size * GROUPS, 1)) if kept else FEW
         self._known: Kept[Array] = Kept(most)
@@ -75,6 +76,8 @@ class Travels:
         Returns:
             (n_points, n_groups) of all wanted runs together, or (n_points, n_runs).
         """
+        if name == "lever" and not (self._stops and any(way.stopped for way in solved.ways)):
+            name, order = "gamma", order + 1
         asked = solved, name, order
         return self._known(asked, (), lambda: self._evaluated(*asked))
 

@@ -15,7 +15,7 @@ Crossings that go alike are taken together.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -510,10 +510,14 @@ class BiasExtension(CrossheadTest):
         return gone(parts, self._travels(D), motion, self._going_runs, self._even)
 
     def _force(
-        self, travel: Any, variants: Sequence[FrameVariant], values: Mapping[str, float]
+        self,
+        travel: Any,
+        variants: Sequence[FrameVariant],
+        values: Mapping[str, float],
+        by: Collection[str] | None = None,
     ) -> Varying:
         self._mixture = self._mixed(variants, values)
-        whole = super()._force(travel, variants, values)
+        whole = super()._force(travel, variants, values, by)
         D, travels = travel["D"], self._travels(travel["D"])
         rest = of_ways(self._mixture, travels, D.slopes, "rest")
         rest += self._correction(variants, travel, "force")
