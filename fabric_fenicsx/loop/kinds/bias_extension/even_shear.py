@@ -28,7 +28,7 @@ from ....inputs.parameters import Parameter
 from ...expressions.marching import Varying
 from .mixture import Part, Travels, number, of_ways
 
-__all__ = ["EVEN", "ZONES", "EvenZones", "beside", "of_both"]
+__all__ = ["EVEN", "IN_WORDS", "SHARES", "ZONES", "EvenZones", "beside", "in_zones", "of_both"]
 
 Array = npt.NDArray[np.float64]
 
@@ -40,6 +40,12 @@ EVEN = Parameter(
     meaning="share of the strip that shears evenly in each of its zones",
     of_model=True,
 )
+IN_WORDS = (
+    f"How much of the strips shears evenly in each zone, as the common formula has it, is fitted "
+    f"({EVEN.name}); the rest goes as the net of tows, whose middle is sheared less. A case has no "
+    "key for it: there all of a strip is the net."
+)
+"""What a report says of it."""
 #: Zones of a strip, A and B, and their shares of the angle.
 ZONES, SHARES = 2, np.array([1.0, 0.5])
 #: Largest angle of the formula [rad]: tows never lie along each other.

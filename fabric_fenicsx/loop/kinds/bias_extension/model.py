@@ -36,7 +36,7 @@ from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
 from .curves import Moment, at_knots, at_knots_back
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
-from .even_shear import EVEN, EvenZones, of_both
+from .even_shear import EVEN, IN_WORDS, EvenZones, of_both
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
 from .going import columns_of, gone
 from .mixture import Part, Travels, number, of_ways
@@ -573,7 +573,8 @@ class BiasExtension(CrossheadTest):
     def notes(self) -> list[str]:  # type: ignore[override]
         """What a report must say of the model."""
         strips, angles = self._strips, self._together.notes
-        return [*strips.notes, *foretold_in_words(self.foretold), *angles, *strips.left_out]
+        even = [] if self._even is None else [IN_WORDS]
+        return [*strips.notes, *even, *foretold_in_words(self.foretold), *angles, *strips.left_out]
 
 
 def _laws(variants: Sequence[Variant]) -> list[FrameVariant | None]:
