@@ -236,6 +236,16 @@ def test_what_a_force_leaves_is_found_where_it_falls_steeply():
     assert (found.slopes["a"] <= 0.0).all() and set(found.slopes) == {"a"}
 
 
+def test_forces_of_strips_that_go_back_tell_the_share_by_themselves():
+    runs = [made_up(size, k) for k, size in enumerate(SIZES)]
+    for run in runs:
+        del run.columns["shear_angle_deg"]
+    base = Models(BiasExtension([measured(*runs)]), []).base
+    assert base.values[EVEN.name] > 0.8 and base.errors[EVEN.name] < 0.15
+    for name, value in LAW.items():
+        assert base.values[name] == pytest.approx(value, abs=3 * base.errors[name])
+
+
 def test_there_is_no_share_where_nothing_tells_it():
     def share_of(*runs):
         return EVEN.name in names_of(BiasExtension([measured(*runs)]))
@@ -243,7 +253,9 @@ def test_there_is_no_share_where_nothing_tells_it():
     runs = made_up(SIZES[0], 0), made_up(SIZES[1], 1, holdout=True)
     assert share_of(*runs)
     blind = {k: v for k, v in runs[0].columns.items() if k != "shear_angle_deg"}
-    assert not share_of(replace(runs[0], columns=blind), runs[1])
+    assert share_of(replace(runs[0], columns=blind))
+    one_way = {name: column[:60] for name, column in blind.items()}
+    assert not share_of(replace(runs[0], columns=one_way), runs[1])
     # Nor where the formula is not known.
     assert not share_of(made_up((76.0, 40.0), 0))
 

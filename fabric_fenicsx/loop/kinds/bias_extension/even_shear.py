@@ -11,7 +11,8 @@ strip is made up by. A share ε of the strip shears evenly,
 
     F = (1 − ε) F_net + ε F_even,    γ_middle = (1 − ε) γ_net + ε γ
 
-and ε is a parameter of the baseline where the angle of the middle is read, which tells it. Where
+and ε is a parameter of the baseline where the angle of the middle is read, which tells it, or where
+strips go back: of the forces of one way out any curve m(γ) makes up for much of it. Where
 tows slip or stretch the strip of even zones lags as the net does, by the same share of its angle;
 a slip stands in series, so that F_even is that of the zones at the angle that they have.
 """

@@ -292,9 +292,12 @@ class BiasExtension(CrossheadTest):
         return self._together.named(found)
 
     def _even_zones(self, runs: Sequence[tuple[Measurement, Run]]) -> EvenZones | None:
-        """The zones of all runs, where angles are read that are fitted and their formula holds."""
-        fitted = [not run.holdout for _, run in runs]
-        if not (self.may_be_even and (self._angles & np.array(fitted)).any()):
+        """The zones of all runs, where what is fitted may tell them and their formula holds.
+
+        Angles do, and forces of strips that go back: those of one way out know a curve alone.
+        """
+        fitted = np.array([not run.holdout for _, run in runs])
+        if not (self.may_be_even and (fitted & (self._angles | self._back.any(axis=0))).any()):
             return None
         try:
             return EvenZones([strip_of(m, run) for m, run in runs])
