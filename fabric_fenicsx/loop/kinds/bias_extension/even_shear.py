@@ -67,6 +67,8 @@ class EvenZones:
 
     def __init__(self, strips: Sequence[BiasStrip]) -> None:
         self._strips = list(strips)
+        self._free = np.array([strip.pull(np.zeros(1))[0] for strip in strips])
+        self._ends = np.array([_ends(strip) for strip in strips]).T
         #: The last travel that was asked for, most often the recorded one, and its angle.
         self._last: tuple[Varying, tuple[Varying, Varying]] | None = None
         #: Of fabric [mm²], (n_runs, ZONES).
@@ -97,15 +99,14 @@ class EvenZones:
     def lever(self, gamma: Varying) -> Varying:
         """dγ/dD [rad/mm] of strips that do not slip, at angles of zone A, (n_points, n_runs)."""
         half = np.clip(gamma.value, -MOST, MOST) / 2.0
-        free = np.array([strip.pull(np.zeros(1))[0] for strip in self._strips])
-        pull = free * (np.cos(half) - np.sin(half))
-        by_angle = free * (np.cos(half) + np.sin(half)) / (2.0 * pull**2)
+        pull = self._free * (np.cos(half) - np.sin(half))
+        by_angle = self._free * (np.cos(half) + np.sin(half)) / (2.0 * pull**2)
         return Varying(1.0 / pull, {p: by_angle * slope for p, slope in gamma.slopes.items()})
 
     def _of_travel(self, D: Varying) -> Varying:
         """The formula's angle, (n_points, n_runs)."""
-        columns = zip(self._strips, D.value.T, strict=True)
-        gamma = np.stack([strip.angle(np.clip(d, *_ends(strip))) for strip, d in columns], axis=1)
+        columns = zip(self._strips, np.clip(D.value, *self._ends).T, strict=True)
+        gamma = np.stack([strip.angle(d) for strip, d in columns], axis=1)
         lever = self.lever(Varying(gamma)).value
         return Varying(gamma, {p: lever * slope for p, slope in D.slopes.items()})
 

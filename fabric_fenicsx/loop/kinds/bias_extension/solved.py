@@ -153,8 +153,7 @@ class Solved:
             np.concatenate([(by(way) * way.gamma(D, 1)).ravel() for way, D in every])
             for by in (attrgetter("area"), attrgetter("speed"))
         )
-        units = [np.interp(np.abs(passed), np.radians(KNOTS), one) for one in np.eye(len(KNOTS))]
-        by_moments = np.stack([np.sign(passed) * weight * unit for unit in units], axis=1)
+        by_moments = (np.sign(passed) * weight * _straight_between_knots(np.abs(passed))).T
         out = TRAVELS * GROUPS * len(ways)
         return cls(curve, tuple(ways), by_moments, weight * rate, out)
 
@@ -391,8 +390,12 @@ def reached(solved: Solved, furthest: Array) -> Array:
     area = np.zeros_like(gamma)
     for way, D in zip(solved.ways, furthest, strict=True):
         area += np.sum(way.area * (way.gamma(D) > gamma[:, None]), axis=1)
-    shapes = np.stack([np.interp(gamma, np.radians(KNOTS), unit) for unit in np.eye(len(KNOTS))])
-    return np.asarray(shapes @ area * (gamma[1] - gamma[0]))
+    return np.asarray(_straight_between_knots(gamma) @ area * (gamma[1] - gamma[0]))
+
+
+def _straight_between_knots(gamma: Array) -> Array:
+    """What a moment at each of KNOTS counts for at angles [rad], (n_knots, n)."""
+    return np.stack([np.interp(gamma, np.radians(KNOTS), unit) for unit in np.eye(len(KNOTS))])
 
 
 def _way(path: StripPath, group: npt.NDArray[np.int64], curve: Curve) -> Way:
