@@ -393,6 +393,8 @@ class BiasExtension(CrossheadTest):
         self._settled[key] = exact, changes
         self._mixture = self._mixed(variants, values)
         self._corrections[key] = correction(exact, self._mixture, self._furthest)
+        # What slipped was by the force as it was foretold before.
+        self._slips.clear()
 
     def _mixed(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[Part]:
         """What is known of the strips of a model, solved now where that is not enough.
