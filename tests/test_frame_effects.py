@@ -184,3 +184,37 @@ def test_what_adds_alike_is_not_asked_for_again(alone, names):
     assert (alike == 0) == moves
     if not moves:
         assert alike > 20
+
+
+def test_forms_that_are_unlikely_beside_a_model_are_not_asked_for(alone):
+    """Where the model changes what they add; what is not known beforehand always is."""
+    test, base, known = alone
+    effects = [*test.effects, *test.terms]
+    moved = next(e for e in effects if e.name == "travel_of_displacement").variants[0]
+    values = base.values | {p.name: 0.1 for p in moved.parameters}
+    model = fit(test, (moved,), values, base.used, base.variances, evaluations=1)
+    others = [e for e in effects if e.name != "travel_of_displacement"][::3]
+    unknown = others[0].variants[0]
+    known = {v: own for v, own in known.items() if v is not unknown}
+    taken = set()
+
+    def likely(every):
+        first = every[:: len(every) // 5]
+        taken.update(v for ((v, _),) in first)
+        return first
+
+    whole, some = signed(test, model, others, known), signed(test, model, others, known, likely)
+    left_out = 0
+    for effect in others:
+        for variant, own in whole[effect].items():
+            mine = some[effect][variant]
+            begins = not any(one.little(variant) for one in own)
+            if variant in taken or variant is unknown or begins:
+                assert [one.at for one in mine] == [one.at for one in own]
+                assert all(
+                    np.array_equal(a.expected, b.expected) for a, b in zip(mine, own, strict=True)
+                )
+            else:
+                assert mine == []
+                left_out += 1
+    assert len(taken) >= 5 and left_out > 20

@@ -341,3 +341,31 @@ def test_a_model_that_was_fitted_badly_alone_is_fitted_from_what_it_is_with_othe
     own._with_one_less(levels)
     (best, *_) = [m for m in levels[1] if m.effects == alone.effects]
     assert best.criterion == pytest.approx(alone.criterion, abs=1.0)
+
+
+def test_models_that_may_be_the_best_are_refined_together_and_others_left(monkeypatch):
+    """As many as are compared at most; one that has the same forms, or is far behind, is not."""
+    t = np.linspace(0.0, 1.0, EACH)
+    shapes = {f"c{k}": lambda t, k=k: np.sin((3 + k) * t) for k in range(4)}
+    test = made(shapes, lambda t: 0.5 * np.sin(3.0 * t), [linear_effect(n) for n in shapes])
+    models = Models(test, test.effects)
+    fits = models.fitted(
+        [
+            ((v, one),)
+            for e in test.effects
+            for v, own in models.signed([e])[e].items()
+            for one in own
+        ],
+        starts=1,
+    )
+    weighed = models.weighed([*fits, fits[0]])
+    assert weighed[0].effects[0].name == "c0" and len(t) == EACH
+    together = []
+    each = models.each_refined
+    monkeypatch.setattr(models, "each_refined", lambda own: together.append(own) or each(own))
+    best = models.best_refined(weighed)
+    assert best[0].effects[0].name == "c0"
+    (first,) = together
+    forms = [m.fit.variants for m in first]
+    assert len(set(forms)) == len(forms) <= 3
+    assert all(m.criterion < weighed[0].criterion + 60.0 for m in first)

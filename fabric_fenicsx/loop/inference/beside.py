@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from ...errors import SolveError
@@ -13,6 +13,9 @@ from .fitting import Fit
 from .screen import Signatures
 
 __all__ = ["by_itself", "forms_beside", "signed"]
+
+Likely = Callable[[Sequence[Combination]], Sequence[Combination]]
+"""Of single forms with a shape each those that may do well."""
 
 
 def by_itself(forms: Mapping[Variant, Sequence[Signature]]) -> list[Combination]:
@@ -25,6 +28,7 @@ def signed(
     model: Fit,
     effects: Sequence[Effect],
     known: Mapping[Variant, Sequence[Signature]] = MappingProxyType({}),
+    likely: Likely | None = None,
 ) -> Signatures:
     """A model's sensitivities to each form of some effects, where specimens are alike.
 
@@ -35,6 +39,8 @@ def signed(
         model: of it.
         effects: that may be added.
         known: sensitivities of the baseline, which may be the model's as well.
+        likely: those that are worth asking the model for, of forms with what they would add to it
+            if it were that; by default all.
 
     Raises:
         SolveError: the model has no solution there.
@@ -45,14 +51,23 @@ def signed(
         effect: {v: [] for v in effect.variants if own.isdisjoint(p.name for p in v.parameters)}
         for effect in effects
     }
+
+    def as_known(variant: Variant) -> list[Signature]:
+        return [one.beside(model.values, expected, slopes) for one in known[variant]]
+
     new: list[tuple[Effect, Variant]] = []
     for effect, forms in found.items():
         for variant in forms:
             if variant in known and experiment.added_alike(variant, model.variants):
-                alike = known[variant]
-                forms[variant] = [one.beside(model.values, expected, slopes) for one in alike]
+                forms[variant] = as_known(variant)
             else:
                 new.append((effect, variant))
+    if likely is not None:
+        guessed = {v: as_known(v) for _, v in new if v in known}
+        little = {v: [one for one in shapes if one.little(v)] for v, shapes in guessed.items()}
+        taken = {v for ((v, _),) in likely(by_itself(little))}
+        # Of what is never absent, or was not looked at, nothing is known beforehand.
+        new = [(effect, v) for effect, v in new if v in taken or not little.get(v)]
     every = each_by_itself(
         experiment,
         lambda form: signatures(experiment, model, expected, slopes, form[1]),
@@ -69,6 +84,7 @@ def forms_beside(
     model: Fit,
     effects: Sequence[Effect],
     known: Mapping[Variant, Sequence[Signature]] = MappingProxyType({}),
+    likely: Likely | None = None,
 ) -> list[Combination]:
     """Every form of some effects, about a model of specimens that are alike; see signed.
 
@@ -76,7 +92,7 @@ def forms_beside(
     what they have in common has not.
     """
     try:
-        every = signed(experiment, model, effects, known)
+        every = signed(experiment, model, effects, known, likely)
     except SolveError:
         return []
     return [one for forms in every.values() for one in by_itself(forms)]

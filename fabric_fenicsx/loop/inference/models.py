@@ -13,7 +13,7 @@ from .beside import forms_beside, signed
 from .criteria import CRITERIA
 from .effects import Effect, Variant
 from .experiment import Experiment, Flags, each_by_itself
-from .first_order import SMALL, Combination, Signature
+from .first_order import SMALL, Combination, Signature, ToFirstOrder
 from .fitting import Fit, fit, parameters_of, soft_size
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise
@@ -36,6 +36,8 @@ REFINED_WITHIN = 60.0
 #: Noise over what it was taken to be for the first fits, below which these are looked at again; how
 #: many are, and how many of a set of effects.
 QUIETER, AGAIN, AGAIN_OF_A_SET = 0.8, 12, 4
+#: Effects that are likely to do best beside a model, of as many as are wanted there.
+LIKELY = 2
 #: Difference of criteria below which the simpler model is the better one: another form that has a
 #: parameter on its bound is the same model.
 AS_GOOD = 1.0
@@ -124,13 +126,15 @@ class Models:
 
     def with_solutions(self, models: Sequence[Model]) -> list[Fit]:
         """Those models that have a solution with the variances as they are now, fitted so."""
-        found = []
-        for model in models:
+
+        def fitted(model: Model) -> Fit | None:
             try:
-                found.append(self.with_these_variances(model))
+                return self.with_these_variances(model)
             except SolveError:
-                continue
-        return found
+                return None
+
+        known = [self.variances, *self._parts(models)]
+        return [one for one in each_by_itself(self.experiment, fitted, models, known) if one]
 
     def fitted(
         self,
@@ -150,7 +154,7 @@ class Models:
             self.variances,
             starts=starts,
             most=most,
-            kind=lambda one: frozenset(self.effect_of(v) for v, _ in one),
+            kind=self._effects_in,
             robust=CRITERIA.far,
         )
         found = [model for model in every if not cancelling(model)]
@@ -200,9 +204,30 @@ class Models:
         self._known |= {v: own for forms in found.values() for v, own in forms.items()}
         return found
 
-    def beside(self, model: Fit, effects: Sequence[Effect]) -> list[Combination]:
-        """Every form of some effects beside a model; see beside.forms_beside."""
-        return forms_beside(self.experiment, model, effects, self._known)
+    def beside(
+        self, model: Fit, effects: Sequence[Effect], most: int | None = None
+    ) -> list[Combination]:
+        """Every form of some effects beside a model; see beside.forms_beside.
+
+        Args:
+            model: fitted.
+            effects: that it has not.
+            most: how many are wanted; by default all. Of others, which are far from it by what
+                they add to the baseline, the model is not asked.
+        """
+        if most is None:
+            return forms_beside(self.experiment, model, effects, self._known)
+        linear = ToFirstOrder(self.experiment, model, self.variances, CRITERIA.far)
+        return forms_beside(
+            self.experiment,
+            model,
+            effects,
+            self._known,
+            lambda every: linear.most_promising(every, 1, LIKELY * most, self._effects_in),
+        )
+
+    def _effects_in(self, combination: Combination) -> frozenset[Effect]:
+        return frozenset(self.effect_of(variant) for variant, _ in combination)
 
     def effects_of(self, model: Fit) -> tuple[Effect, ...]:
         """Effects of a fitted model, in the order of its forms."""
@@ -248,6 +273,29 @@ class Models:
             except SolveError:
                 break
         return self._as_attained(model)
+
+    def each_refined(self, models: Sequence[Model]) -> list[Model]:
+        """Each of some models; see refined."""
+        return each_by_itself(self.experiment, self.refined, models, self._parts(models))
+
+    def of_one_each(self, fits: Sequence[tuple[Effect, Fit]]) -> list[Model]:
+        """Models of one effect each, from their fits; see refined."""
+
+        def made(one: tuple[Effect, Fit]) -> Model:
+            effect, model = one
+            return self.refined(self.judge.weighed(model, (effect,)))
+
+        known: list[object] = [self.experiment.readings, self.judge.rows]
+        for effect, model in fits:
+            known += [model, effect, model.used, *model.variants]
+        return each_by_itself(self.experiment, made, fits, known)
+
+    def _parts(self, models: Sequence[Model]) -> list[object]:
+        """What is the very same in models that copies of the process make of some."""
+        parts: list[object] = [self.experiment.readings, self.judge.rows]
+        for model in models:
+            parts += [model, model.fit, model.fit.used, *model.fit.variants, *model.effects]
+        return parts
 
     def _again(self, model: Model, variances: Variances, evaluations: int) -> Model:
         """A model fitted again from where it is, with other variances."""
@@ -295,6 +343,7 @@ class Models:
         A model is only compared as the best when its parameters go with its own variances.
         """
         refined: list[Model] = []
+        ahead: dict[Model, Model] = {}
         rest = sorted(models, key=lambda m: m.criterion)
         while rest:
             best = min((m.criterion for m in refined), default=float("inf"))
@@ -302,15 +351,29 @@ class Models:
                 break
             if rest[0].criterion > best + REFINED_WITHIN or len(refined) >= 2 * REFINED:
                 break
-            model = rest.pop(0)
-            if model not in self._refined:
-                model = self.refined(model)
+            if rest[0] not in self._refined:
+                if rest[0] not in ahead:
+                    first = self._first_ones(rest, best)
+                    ahead |= zip(first, self.each_refined(first), strict=True)
+                model = ahead[rest.pop(0)]
                 self._refined.add(model)
+            else:
+                model = rest.pop(0)
             # Another start that leads to the same place.
             same = [m for m in rest if m.fit.variants == model.fit.variants]
             rest = [m for m in rest if m not in same or m.criterion < model.criterion - 1.0]
             refined.append(model)
         return simplest_first(refined) + rest
+
+    def _first_ones(self, rest: Sequence[Model], best: float) -> list[Model]:
+        """The first model and the next ones that are likely to be refined after it."""
+        found = [rest[0]]
+        for model in rest[1:REFINED]:
+            near = model.criterion <= min(best, rest[0].criterion) + REFINED_WITHIN
+            new = all(model.fit.variants != other.fit.variants for other in found)
+            if near and new and model not in self._refined:
+                found.append(model)
+        return found
 
     def ranked(self, found: Sequence[Fit]) -> list[Model]:
         """Fits as models with their own noise and scatter, the best first; see weighed.

@@ -108,12 +108,13 @@ class Search:
         of_the_curve = self._of_the_curve(levels) if curve is not None else ()
         instead = models_instead(self.judge, levels, chosen) if verdict == "unexplained" else {}
         rivals = rivals_of(self.models, final, in_their_place)
-        for candidate in candidates:
-            if candidate.fit is not None:
-                # Those far behind have not got their own noise and scatter yet.
-                model = self.models.refined(self.judge.weighed(candidate.fit, (candidate.effect,)))
-                candidate.fit, candidate.criterion = model.fit, model.criterion
-                candidate.holdout = self.judge.holdout(candidate.fit)
+        fits = {c.effect: c.fit for c in candidates if c.fit is not None}
+        # Those far behind have not got their own noise and scatter yet.
+        own = {m.effects[0]: m for m in self.models.of_one_each([*fits.items()])}
+        for candidate in (c for c in candidates if c.effect in own):
+            model = own[candidate.effect]
+            candidate.fit, candidate.criterion = model.fit, model.criterion
+            candidate.holdout = self.judge.holdout(model.fit)
         self.found = Diagnosis(
             experiment=self.experiment,
             verdict=verdict,
@@ -363,15 +364,19 @@ class Search:
         linear = ToFirstOrder(self.experiment, base, variances, CRITERIA.far)
         return Screen(base, linear, signs)
 
-    def _added_to(self, model: Fit) -> list[Combination]:
+    def _added_to(self, model: Fit, most: int | None = None) -> list[Combination]:
         """Every form of every other effect beside those of a model, about that model.
 
         Those over two variables as well, of which no two are looked at together. Where a model is
         far from linear, what lacks beside it is not seen about the baseline.
+
+        Args:
+            model: fitted.
+            most: how many others are wanted; see Models.beside.
         """
         present = self.models.effects_of(model)
         others = [e for e in (*self.effects, *self._of_two) if e not in present]
-        return self.models.beside(model, others)
+        return self.models.beside(model, others, most)
 
     def _bases(self, count: int, level: Sequence[Model]) -> list[Fit]:
         """Models that every other effect is added to, fitted with the variances as they are now.
@@ -398,7 +403,8 @@ class Search:
         most = CRITERIA.terms if self._screened_first else None
         starts = 1 if self._screened_first else min(len(bases), 2)
         for base in bases:
-            fits += self.models.fitted(self._added_to(base), starts=starts, base=base, most=most)
+            more = self._added_to(base, most)
+            fits += self.models.fitted(more, starts=starts, base=base, most=most)
         return self.models.ranked(fits)
 
     def _other_effects(self, level: Sequence[Model]) -> list[Model]:
@@ -465,7 +471,7 @@ class Search:
             self._added_beside |= set(own)
             found: list[Fit] = []
             for base in self.models.with_solutions([fewer[k] for k in own]):
-                more = self._added_to(base)
+                more = self._added_to(base, CRITERIA.terms)
                 found += self.models.fitted(more, starts=1, base=base, most=CRITERIA.terms)
             levels[-1] = self.models.best_refined([*levels[-1], *self.models.weighed(found)])
             self._with_one_less(levels)
