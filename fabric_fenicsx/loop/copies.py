@@ -71,7 +71,8 @@ def in_copies(
         SolveError: a copy has ended before it was done, for want of memory perhaps.
         Exception: what the function raised of a task.
     """
-    count = max(min(cores(), len(tasks), MOST), 1)
+    # A copy has no copies.
+    count = 1 if _is_shared else max(min(cores(), len(tasks), MOST), 1)
     shared = list(known)
     found: list[Any] = [None] * len(tasks)
     copies: list[_Copy] = []

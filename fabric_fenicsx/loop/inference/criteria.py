@@ -158,7 +158,7 @@ class Criteria:
     first_look: int = 12
     ends: int = 24
     worthwhile: float = 30.0
-    hopeless: float = 3.0
+    hopeless: float = 1.5
     half_again: float = 1.5
     one_more: float = 2.0
     far_off: float = 30.0

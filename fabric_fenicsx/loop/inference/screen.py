@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
+from ..copies import in_copies
 from .effects import Effect, Variant
 from .first_order import Combination, Signature, ToFirstOrder
 from .fitting import Fit
@@ -40,8 +41,8 @@ BEST_PAIRS, FORMS = 12, 3
 MOST_SHAPES, MOST_PAIRS = 60, 60
 #: Columns of which all products are taken at once, and otherwise sets that share their products.
 MOST_COLUMNS, SETS = 4000, 300
-#: Groups of sets that are about as wide.
-WIDTHS = 4
+#: Groups of sets that are about as wide, and sets of one that are solved at once.
+WIDTHS, AT_ONCE = 4, 5000
 #: Times that amplitudes of the wrong sign are taken out.
 SIGNS = 3
 
@@ -273,9 +274,9 @@ class Screen:
         own = (np.cumsum(used) - 1)[places]
         columns = self._left[:, used]
         gram = columns.T @ columns
-        split = 1 + len(places) // 20000
-        pairs = zip(np.array_split(places, split), np.array_split(own, split), strict=True)
-        return np.concatenate([self._solved(part, gram, at) for part, at in pairs])
+        parts = np.array_split(np.arange(len(places)), 1 + len(places) // AT_ONCE)
+        found = in_copies(lambda part: self._solved(places[part], gram, own[part]), parts)
+        return np.concatenate(found)
 
     def _columns_of(self, places: Places) -> npt.NDArray[np.bool_]:
         """Which columns some places are those of; of none the last, which is not looked at."""

@@ -18,6 +18,7 @@ from ... import __version__
 from ...errors import InputError
 from ...output.files import write_text
 from ...output.page import inline, number, rendered, save_figure
+from ..copies import in_copies
 from ..inference.diagnosis import Diagnosis
 from .discovered import Discovered
 from .discovered_figures import discovered_figure
@@ -36,6 +37,9 @@ DISCOVERED = (
 )
 
 Part = tuple[Diagnosis, Mapping[str, Any], Sequence[Discovered]]
+
+Figures = dict[str, tuple[Figure, str]]
+"""By name, each with its caption."""
 
 
 def write_report(
@@ -74,8 +78,7 @@ def _write_page(folder: Path, parts: Sequence[Part]) -> None:
         law = law_table(diagnosis, model[0] if model is not None else diagnosis.baseline)
         figures = _figures(diagnosis, report, law)
         figures |= {t.name: (discovered_figure(diagnosis, t), DISCOVERED) for t in terms}
-        for name, (figure, _) in figures.items():
-            save_figure(figure, folder / f"{report['test']}_{name}.png")
+        sources = _written(folder, report["test"], figures)
         if law is not None:
             law.to_csv(folder / f"{report['test']}_law.csv", index=False)
         if diagnosis.curve is not None:
@@ -85,8 +88,8 @@ def _write_page(folder: Path, parts: Sequence[Part]) -> None:
                 "report": report,
                 "unit": parameter_unit(report["error"]["quantity"]),
                 "figures": {
-                    name: {"source": inline(figure, name), "caption": caption}
-                    for name, (figure, caption) in figures.items()
+                    name: {"source": source, "caption": figures[name][1]}
+                    for name, source in sources.items()
                 },
                 "others": [
                     {**error, "unit": parameter_unit(error["quantity"])}
@@ -120,9 +123,18 @@ def share(value: float | None) -> Markup:
     return Markup("&lt; 1 %") if value < 0.005 else Markup(f"{100.0 * value:.0f} %")
 
 
-def _figures(
-    diagnosis: Diagnosis, report: Mapping[str, Any], law: pd.DataFrame | None
-) -> dict[str, tuple[Figure, str]]:
+def _written(folder: Path, test: str, figures: Figures) -> dict[str, str]:
+    """Write the figures of a test as PNG files; as data URIs, by name."""
+
+    def written(name: str) -> str:
+        figure, _ = figures[name]
+        save_figure(figure, folder / f"{test}_{name}.png")
+        return inline(figure, name)
+
+    return dict(zip(figures, in_copies(written, [*figures]), strict=True))
+
+
+def _figures(diagnosis: Diagnosis, report: Mapping[str, Any], law: pd.DataFrame | None) -> Figures:
     """Figures by name, each with its caption."""
     model, names = shown_model(diagnosis), _run_names(report)
     with_model = f" and the model {model[1]}" if model is not None else ""
