@@ -306,6 +306,11 @@ def test_signs_of_general_forms_are_those_of_physics():
         ("picture_frame", "even_moment_of_angle", "tension_coupling"),
         ("picture_frame", "odd_in_rate_moment_of_rate", "rate_hardening"),
         ("picture_frame", "dissipative_moment_of_direction", "crossover_friction"),
+        ("picture_frame", "dissipative_moment_of_angle", "crossover_friction"),
+        # What rubs less for having rubbed is more than a friction.
+        ("picture_frame", "dissipative_moment_of_path", None),
+        # A drift is one, and so is a vibration.
+        ("picture_frame", "reading_of_time", None),
         # A moment that rises is no locking.
         ("picture_frame", "odd_moment_of_angle", None),
     ],

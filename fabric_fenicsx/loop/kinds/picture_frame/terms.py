@@ -69,6 +69,7 @@ OVERTONES = {"time": (0, 2), "angle": (0, 2)}
 
 IN_GENERAL = {
     "dissipative_moment_of_direction": "crossover_friction",
+    "dissipative_moment_of_angle": "crossover_friction",
     "even_moment_of_angle": "tension_coupling",
     "odd_in_rate_moment_of_rate": "rate_hardening",
 }
