@@ -47,9 +47,8 @@ def diagnose_test(
     if names is not None or not experiment.terms:
         return search.run()
     further = Search(experiment, [*listed, *experiment.terms], progress, most=1)
-    if not experiment.terms_are_rivals:
-        # One term is less than several effects, and sooner found.
-        search.gives_way = further.finds_what_several_do_not
+    # One term is less than several effects, and sooner found.
+    search.gives_way = further.finds_what_several_do_not
     found = search.run()
     if found.curve is not None:
         return found
