@@ -72,6 +72,12 @@ def test_what_a_copy_cannot_do_is_done_here_when_the_others_are_done(cores, monk
     put_off_in_copies()
 
 
+def test_a_copy_has_no_copies(made):
+    found = in_copies(lambda _: in_copies(lambda _: os.getpid(), range(4)), range(3))
+    assert all(len(set(own)) == 1 for own in found)
+    assert len({own[0] for own in found}) == 3
+
+
 def test_known_objects_stay_the_very_same():
     def law():
         """No pickle holds what is defined in a function."""

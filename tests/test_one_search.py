@@ -274,6 +274,28 @@ def test_three_effects_are_not_fitted_where_a_term_leaves_far_less_than_two(time
     assert further.finds_what_several_do_not(two) is gives_way
 
 
+@pytest.mark.parametrize("are_rivals", [True, False])
+@pytest.mark.parametrize(("size", "tried"), [(1.0, False), (0.04, True)])
+def test_a_term_is_looked_for_before_several_effects_with_names(
+    monkeypatch, are_rivals, size, tried
+):
+    """Whether or not such terms are rivals; those are fitted together where they may be noise."""
+    names = [f"c{k}" for k in range(2, 6)]
+    columns = {n: lambda t, k=k: np.sin(k * t) for k, n in enumerate(names, 3)}
+    columns["kink"] = lambda t: np.where(t > 0.5, np.sin(40.0 * t), 0.0)
+    test = made(columns, lambda t: size * columns["kink"](t), [linear_effect(n) for n in names])
+    test.terms, test.terms_are_rivals = [linear_effect("kink", acts_on="reading")], are_rivals
+    together = []
+    own = Search._together
+    monkeypatch.setattr(
+        Search, "_together", lambda self, *a: together.append(self.effects) or own(self, *a)
+    )
+    found = diagnose_test(test)
+    assert [e.name for e in found.effects] == ["kink"]
+    with_names_alone = [effects for effects in together if all(e.listed for e in effects)]
+    assert bool(with_names_alone) == tried
+
+
 def test_more_is_added_to_the_next_term_of_one_variable_as_well():
     effects = [
         replace(linear_effect(name), of_two=name == "product")
