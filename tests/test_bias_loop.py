@@ -426,3 +426,29 @@ def test_a_folder_says_what_it_lacks(tmp_path):
     with pytest.raises(InputError, match=r"length_mm: .*at least"):
         short = written(lambda c: c["runs"][0].update(length_mm=30))
         BIAS_EXTENSION.experiment([read_measurement(short)])
+
+
+@pytest.mark.parametrize(("over", "allowed"), [(0.01, True), (0.05, False)])
+def test_a_crosshead_that_comes_back_may_overshoot_a_little(tmp_path, over, allowed):
+    """Forces there are those of the last bit of the way, and numbers; a strip is not pushed."""
+    run = pulled(back=True)
+    D = run.columns["displacement_mm"]
+    D[-1] = -over * TRAVEL
+    rows = "\n".join(f"{t},{d},{f}" for t, d, f in zip(*run.columns.values(), strict=True))
+    (tmp_path / "a.csv").write_text(f"{','.join(run.columns)}\n{rows}")
+    content = {
+        "schema": "fabric-measurement/1",
+        "test": "bias_extension",
+        "fabric": {"areal_density_kg_m2": 0.3, "tow_spacing_mm": 5.0},
+        "rig": {"bias_deg": 45},
+        "runs": [{"file": "a.csv", "role": "fit", "width_mm": 40, "length_mm": 80}],
+    }
+    (tmp_path / "measurement.yaml").write_text(yaml.safe_dump(content))
+    if not allowed:
+        with pytest.raises(InputError, match=r"displacement_mm: -0.7 in reading 57, allowed is 0"):
+            read_measurement(tmp_path)
+        return
+    test = BiasExtension([read_measurement(tmp_path)])
+    force, slopes = test.predict((), VALUES)
+    assert np.isfinite(force).all() and all(np.isfinite(s).all() for s in slopes.values())
+    assert abs(force[-1]) < 0.02 * np.abs(force).max()

@@ -19,6 +19,9 @@ __all__ = ["BIAS_EXTENSION", "BiasExtensionRig", "StripRunKeys"]
 
 Array = npt.NDArray[np.float64]
 
+#: Share of the largest travel by which a crosshead that comes back may overshoot.
+OVERSHOT = 0.02
+
 
 class BiasExtensionRig(Keys):
     """Two clamps that a crosshead draws apart."""
@@ -38,7 +41,8 @@ class StripRunKeys(RunKeys):
 def _mistakes(rig: BiasExtensionRig, columns: Mapping[str, Array]) -> Iterator[Mistake]:
     time, travel = columns["time_s"], columns["displacement_mm"]
     yield "time_s", np.diff(time, prepend=-math.inf) <= 0.0, "a time that increases"
-    yield "displacement_mm", travel < -1e-3 * np.abs(travel).max(), "0 or more: a strip is pulled"
+    pushed = travel < -OVERSHOT * np.abs(travel).max()
+    yield "displacement_mm", pushed, "0 or more: a strip is pulled"
     if "shear_angle_deg" in columns:
         yield "shear_angle_deg", np.abs(columns["shear_angle_deg"]) >= 90.0, "between -90 and 90"
 
