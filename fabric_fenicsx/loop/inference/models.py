@@ -133,7 +133,7 @@ class Models:
             except SolveError:
                 return None
 
-        known = [self.variances, *self._parts(models)]
+        known = self._known_to_all([model.fit for model in models], [self.variances])
         return [one for one in each_by_itself(self.experiment, fitted, models, known) if one]
 
     def fitted(
@@ -276,7 +276,9 @@ class Models:
 
     def each_refined(self, models: Sequence[Model]) -> list[Model]:
         """Each of some models; see refined."""
-        return each_by_itself(self.experiment, self.refined, models, self._parts(models))
+        more = [one for model in models for one in (model, *model.effects)]
+        known = self._known_to_all([model.fit for model in models], more)
+        return each_by_itself(self.experiment, self.refined, models, known)
 
     def of_one_each(self, fits: Sequence[tuple[Effect, Fit]]) -> list[Model]:
         """Models of one effect each, from their fits; see refined."""
@@ -285,17 +287,13 @@ class Models:
             effect, model = one
             return self.refined(self.judge.weighed(model, (effect,)))
 
-        known: list[object] = [self.experiment.readings, self.judge.rows]
-        for effect, model in fits:
-            known += [model, effect, model.used, *model.variants]
+        known = self._known_to_all([model for _, model in fits], [effect for effect, _ in fits])
         return each_by_itself(self.experiment, made, fits, known)
 
-    def _parts(self, models: Sequence[Model]) -> list[object]:
-        """What is the very same in models that copies of the process make of some."""
-        parts: list[object] = [self.experiment.readings, self.judge.rows]
-        for model in models:
-            parts += [model, model.fit, model.fit.used, *model.fit.variants, *model.effects]
-        return parts
+    def _known_to_all(self, fits: Sequence[Fit], more: Sequence[object]) -> list[object]:
+        """What is the very same in what copies of the process make of some fits and more."""
+        own = [one for model in fits for one in (model, model.used, *model.variants)]
+        return [self.experiment.readings, self.judge.rows, *own, *more]
 
     def _again(self, model: Model, variances: Variances, evaluations: int) -> Model:
         """A model fitted again from where it is, with other variances."""
@@ -351,14 +349,14 @@ class Models:
                 break
             if rest[0].criterion > best + REFINED_WITHIN or len(refined) >= 2 * REFINED:
                 break
-            if rest[0] not in self._refined:
-                if rest[0] not in ahead:
+            model = rest[0]
+            if model not in self._refined:
+                if model not in ahead:
                     first = self._first_ones(rest, best)
                     ahead |= zip(first, self.each_refined(first), strict=True)
-                model = ahead[rest.pop(0)]
+                model = ahead[model]
                 self._refined.add(model)
-            else:
-                model = rest.pop(0)
+            rest = rest[1:]
             # Another start that leads to the same place.
             same = [m for m in rest if m.fit.variants == model.fit.variants]
             rest = [m for m in rest if m not in same or m.criterion < model.criterion - 1.0]
@@ -366,9 +364,12 @@ class Models:
         return simplest_first(refined) + rest
 
     def _first_ones(self, rest: Sequence[Model], best: float) -> list[Model]:
-        """The first model and the next ones that are likely to be refined after it."""
+        """The first model and the next ones that are likely to be refined after it.
+
+        Only the first where no copy could refine them meanwhile: it may put them out of the race.
+        """
         found = [rest[0]]
-        for model in rest[1:REFINED]:
+        for model in rest[1 : REFINED if self.experiment.in_copies else 1]:
             near = model.criterion <= min(best, rest[0].criterion) + REFINED_WITHIN
             new = all(model.fit.variants != other.fit.variants for other in found)
             if near and new and model not in self._refined:
@@ -439,9 +440,7 @@ class Models:
             except SolveError:
                 return None
 
-        known = [self.experiment.readings, rows]
-        for model, variances in models:
-            known += [model, variances, *model.variants]
+        known = self._known_to_all([model for model, _ in models], [own for _, own in models])
         return [one for one in each_by_itself(self.experiment, again, models, known) if one]
 
     def with_other_readings(self, levels: Sequence[Sequence[Model]]) -> list[list[Model]]:

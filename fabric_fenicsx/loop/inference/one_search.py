@@ -108,11 +108,10 @@ class Search:
         of_the_curve = self._of_the_curve(levels) if curve is not None else ()
         instead = models_instead(self.judge, levels, chosen) if verdict == "unexplained" else {}
         rivals = rivals_of(self.models, final, in_their_place)
-        fits = {c.effect: c.fit for c in candidates if c.fit is not None}
+        fitted = [(c, c.fit) for c in candidates if c.fit is not None]
         # Those far behind have not got their own noise and scatter yet.
-        own = {m.effects[0]: m for m in self.models.of_one_each([*fits.items()])}
-        for candidate in (c for c in candidates if c.effect in own):
-            model = own[candidate.effect]
+        own = self.models.of_one_each([(c.effect, fit) for c, fit in fitted])
+        for (candidate, _), model in zip(fitted, own, strict=True):
             candidate.fit, candidate.criterion = model.fit, model.criterion
             candidate.holdout = self.judge.holdout(model.fit)
         self.found = Diagnosis(
