@@ -16,6 +16,7 @@ from measurements.bad import good
 from test_cli import MPI, TINY, command, own_lines
 
 from fabric_fenicsx.__main__ import main
+from fabric_fenicsx.cli.collective import collective
 from fabric_fenicsx.output.steps import StepFile
 
 SHORT = TINY.replace("punch_travel_mm: 3", "punch_travel_mm: 1").replace(
@@ -324,3 +325,27 @@ assert between - before > 0.9 * 2**28, (before, between)
 assert resident() - before < 0.1 * 2**28, (before, resident())
 """
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_what_an_interrupt_does_elsewhere_is_still_an_interrupt(capsys):
+    """An archive that is closed over an open entry complains in the interrupt's place."""
+
+    def action(comm):
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(1)
+        finally:
+            raise ValueError("an entry is still open")
+
+    before = signal.getsignal(signal.SIGINT)
+    assert collective(action) == 130
+    assert capsys.readouterr().err == "interrupted: nothing has been written\n"
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_an_error_of_its_own_is_none(capsys):
+    def action(comm):
+        raise ValueError("a mistake")
+
+    with pytest.raises(ValueError, match="a mistake"):
+        collective(action)

@@ -24,7 +24,9 @@ def collective(action: Callable[[Any], int], folder: Path | None = None) -> int:
 
     Bad input is one line from rank 0. Whatever else goes wrong on one of several ranks ends all of
     them: the others would wait for ever. SIGTERM, which mpirun and batch systems send before they
-    kill, ends a run like Ctrl-C.
+    kill, ends a run like Ctrl-C. After either, any error is taken for theirs: where one comes up
+    decides what it is by the time that it arrives here, an archive's complaint about an entry that
+    is still open for one.
 
     Args:
         action: given MPI's world; its exit code is this one's.
@@ -33,10 +35,27 @@ def collective(action: Callable[[Any], int], folder: Path | None = None) -> int:
     comm = world()
     guard = comm.Dup()
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    interrupts: list[int] = []
+
+    def interrupt(number: int, frame: Any) -> None:
+        interrupts.append(number)
+        raise KeyboardInterrupt
+
+    for number, handler in before.items():
+        # In the background of a shell Ctrl-C is ignored, and stays so.
+        if number == signal.SIGTERM or handler is signal.default_int_handler:
+            signal.signal(number, interrupt)
     try:
         return action(comm)
-    except (InputError, SolveError, KeyboardInterrupt, OSError) as error:
+    except (Exception, KeyboardInterrupt) as raised:
+        error = KeyboardInterrupt() if interrupts else raised
+        if not isinstance(error, (InputError, SolveError, KeyboardInterrupt, OSError)):
+            if comm.size == 1:
+                raise
+            traceback.print_exc()
+            sys.stderr.flush()
+            comm.Abort(1)
+            return 1
         # A second Ctrl-C must not come in between.
         for number in before:
             signal.signal(number, signal.SIG_IGN)
@@ -48,13 +67,6 @@ def collective(action: Callable[[Any], int], folder: Path | None = None) -> int:
                 print(line, file=sys.stderr, flush=True)
             comm.Abort(code)
         return code
-    except Exception:
-        if comm.size == 1:
-            raise
-        traceback.print_exc()
-        sys.stderr.flush()
-        comm.Abort(1)
-        return 1
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
