@@ -80,8 +80,8 @@ def inertia(rng, s: Scales) -> Effect:
     p = {"mass": 1.0}
 
     def force(motion: Motion, f: np.ndarray, p: dict) -> np.ndarray:
-        speed = np.gradient(motion.displacement, motion.time)
-        return f + p["mass"] * np.gradient(speed, motion.time)
+        speed = np.gradient(motion.displacement, motion.time, edge_order=2)
+        return f + p["mass"] * np.gradient(speed, motion.time, edge_order=2)
 
     return Effect("frame_inertia", "mass", p, "mass", force=force)
 

@@ -106,7 +106,9 @@ def terms_left(columns: Columns, base: Array, signal: Array) -> dict[str, float]
         "reading: force": curves["force"],
         "reading: rate": curves["speed"],
         "reading: time": curves["time"],
-        "reading: acceleration": [lambda p: np.gradient(np.gradient(p.travel)) / p.step**2],
+        "reading: acceleration": [
+            lambda p: np.gradient(np.gradient(p.travel, edge_order=2), edge_order=2) / p.step**2
+        ],
     }
     for name in ("displacement", "force", "time"):
         forces[f"travel: {name}"] = [

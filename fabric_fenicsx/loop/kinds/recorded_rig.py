@@ -23,8 +23,8 @@ Array = npt.NDArray[np.float64]
 BY_TRAVEL = "travel"
 #: Share of what was off before that is too much of it.
 LITTLE_NEARER = 0.5
-#: Readings of a run that tell nothing of an acceleration.
-FEWEST = 3
+#: Readings of a run that tell nothing of an acceleration, and those that tell it at its ends.
+FEWEST, END = 3, 5
 
 
 class RecordedRig:
@@ -123,7 +123,8 @@ class RecordedRig:
     def acceleration(self) -> Varying:
         """Of the crosshead [mm/s²], as its readings tell: differences twice from one to the next.
 
-        Between them nobody knows how sharp a corner is.
+        At both ends, where a run may have its largest acceleration, of the cubic that is nearest to
+        the readings there. Between readings nobody knows how sharp a corner is.
         """
         place, run = self.place
         time, D = (self.points[name].value for name in ("time", "D"))
@@ -133,8 +134,10 @@ class RecordedRig:
             own = np.unique(place[run == k])
             t = time[own, k]
             if len(own) > FEWEST:
-                speed = np.gradient(D[own, k], t)
-                found[:, k] = np.interp(time[:, k], t, np.gradient(speed, t))
+                bent = np.gradient(np.gradient(D[own, k], t), t)
+                bent[:2] = _bent_at_end(t[:END], D[own[:END], k])
+                bent[:-3:-1] = _bent_at_end(t[: -END - 1 : -1], D[own[: -END - 1 : -1], k])
+                found[:, k] = np.interp(time[:, k], t, bent)
         return Varying(found)
 
     def per_second(self, x: Varying) -> Varying:
@@ -180,6 +183,12 @@ class RecordedRig:
             added = variant.reading(marched.at, marched.at["time"])
             self._compiled[key] = marched.define({"force": added}, {})
         return self._compiled[key](self.points, values)["force"]
+
+
+def _bent_at_end(time: Array, values: Array) -> Array:
+    """Second derivative at the first two of some places, of the cubic nearest to all of them."""
+    cubic = np.polynomial.Polynomial.fit(time, values, 3)
+    return np.asarray(cubic.deriv(2)(time[:2]))
 
 
 def left_by(added: Callable[..., Varying], travel: Any, rounds: int) -> Varying:
