@@ -1,10 +1,23 @@
 """What a crosshead's record tells of its motion."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from fabric_fenicsx.loop.diagnose import read_measurement
+from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.motion import crosshead_motion
 from fabric_fenicsx.loop.kinds.recorded_rig import RecordedRig
+
+HEAD = """\
+schema: fabric-measurement/1
+test: picture_frame
+title: the same motion, read more or less often
+fabric: {areal_density_kg_m2: 0.25, tow_spacing_mm: 10}
+rig: {frame_length_mm: 200, fabric_length_mm: 120}
+noise: {force_N: 0.01}
+runs:
+"""
 
 
 def from_rest(t):
@@ -37,3 +50,65 @@ def test_what_goes_at_one_speed_has_no_acceleration():
     t = np.linspace(0.0, 10.0, 51)
     rig = RecordedRig([crosshead_motion(t, 2.0 * t)], {})
     np.testing.assert_allclose(rig.acceleration.value, 0.0, atol=1e-9)
+
+
+def frame(folder, per_second):
+    """A frame's three runs, read so often: to and fro, ramps, and to one side."""
+    folder.mkdir()
+    times, places = [0, 20, 35, 45, 50, 75, 85, 120], [0, 30, 30, 10, 10, 42, 42, 0]
+    motions = {
+        "out": (100, lambda t: 25.0 * (1.0 - np.cos(2.0 * np.pi * t / 20.0))),
+        "to_and_fro": (91, lambda t: 20.0 * np.sin(2.0 * np.pi * t / 13.0)),
+        "ramps": (120, lambda t: np.interp(t, times, places)),
+    }
+    for name, (end, motion) in motions.items():
+        t = np.linspace(0.0, end, end * per_second + 1)
+        D = motion(t)
+        record = {"time_s": t, "displacement_mm": D, "force_N": 0.3 * D + 0.01 * np.sin(t)}
+        pd.DataFrame(record).to_csv(folder / f"{name}.csv", index=False, float_format="%.12g")
+    runs = "\n".join(f"  - {{file: {name}.csv, role: fit}}" for name in motions)
+    (folder / "measurement.yaml").write_text(HEAD + runs + "\n")
+    return PictureFrame([read_measurement(folder)])
+
+
+@pytest.fixture(scope="module")
+def frames(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("frames")
+    return frame(folder / "seldom", 4), frame(folder / "often", 32)
+
+
+@pytest.mark.parametrize(
+    ("effect", "label", "known"),
+    [
+        ("reading_of_force_lag", "linear", 0.02),
+        ("travel_of_displacement_lag", "linear", 0.02),
+        ("travel_of_displacement", "periodic", 0.01),
+        ("travel_of_recent_force", "2 coefficients", 0.01),
+        ("elastic_moment_of_history", "recent angle, 2 coefficients", 0.01),
+        ("viscous_moment_of_history", "recent work, 2 coefficients", 0.01),
+        ("viscous_moment_of_history", "recent square of angle, corner", 0.01),
+        ("dissipative_moment_of_history", "recent rate, 2 coefficients", 0.02),
+    ],
+)
+def test_a_term_does_not_depend_on_how_often_it_was_read(frames, effect, label, known):
+    """Four readings a second tell the same as 32."""
+    seldom, often = frames
+    term = next(e for e in seldom.terms if e.name == effect)
+    form = next(v for v in term.variants if v.label == label)
+    values = {"k1_N": 0.3, "k3_N": 1.0, "c1_N_s": 0.3}
+    added = []
+    for test in (seldom, often):
+        first = {p.name: 0.1 if p.amplitude else p.starts[0] for p in form.parameters}
+        with_it = test.predict((form,), values | first)[0] - test.predict((), values)[0]
+        added.append(with_it)
+    same = np.concatenate([start + 8 * np.arange(n) for start, n in own_readings(often)])
+    apart = added[0] - added[1][same]
+    rows = seldom.readings.usable & often.readings.usable[same]
+    assert np.sqrt(np.mean(apart[rows] ** 2)) < known * np.sqrt(np.mean(added[0][rows] ** 2))
+
+
+def own_readings(test):
+    """First reading of each run, and how many there are at every eighth."""
+    for run in np.unique(test.readings.run):
+        rows = np.flatnonzero(test.readings.run == run)
+        yield rows[0], 1 + (len(rows) - 1) // 8

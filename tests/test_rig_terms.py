@@ -445,6 +445,8 @@ def stepped(variant, values, **columns):
     """What a form adds at each step of one second."""
     expression = variant.added_reading or variant.added_travel
     past, found = as_ufl(0.0), []
+    before = {f"{name}_before": np.append(x[:1], x[:-1]) for name, x in columns.items()}
+    columns = columns | before
     for row in zip(*columns.values(), strict=True):
         at = {name: as_ufl(float(x)) for name, x in zip(columns, row, strict=True)}
         at["per_time"] = as_ufl(1.0)
@@ -466,6 +468,11 @@ def test_variables_that_remember():
     assert stepped(of("recent_force"), {}, force=held) == pytest.approx(2.0 * (1.0 - kept))
     assert stepped(of("force_lag"), {}, force=held) == pytest.approx(-2.0 * kept)
     assert stepped(of("displacement_lag"), {}, displacement=held) == pytest.approx(-2.0 * kept)
+    # Even changes within the steps are followed exactly.
+    at, even = np.arange(1.0, 7.0), 2.0 * np.arange(6.0)
+    mean = even - 6.0 * (1.0 - np.exp(-(at - 1.0) / 3.0))
+    assert stepped(of("recent_force"), {}, force=even) == pytest.approx(mean)
+    assert stepped(of("displacement_lag"), {}, displacement=even) == pytest.approx(mean - even)
     assert stepped(of("mean_speed"), {}, speed=-held) == pytest.approx(2.0 * (1.0 - kept))
     assert stepped(of("way"), {}, speed=-held) == pytest.approx(2.0 * np.arange(1, 7))
     to_and_fro = np.array([1.0, -3.0, 2.0, 0.0, 4.0])

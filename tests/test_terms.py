@@ -81,17 +81,24 @@ def test_what_a_factor_depends_on(variable, expected):
 
 
 def test_memories_fade():
-    """After a step the mean goes as 1 − e^(−t/τ), a largest value afterwards as e^(−t/τ)."""
-    held = np.full(8, 0.3)
+    """The mean goes after an angle as 1 − e^(−t/τ), a largest value afterwards as e^(−t/τ)."""
     t = STEP * np.arange(1, 9)
     mean = ShapedLaw("odd", "recent_angle", reach=1.0, coefficients=(1.0,), memory=2.0)
-    assert marched(mean, held)[1] == pytest.approx(0.3 * (1.0 - np.exp(-t / 2.0)))
+    behind = 2.0 * (1.0 - np.exp(-t / 2.0))
+    assert marched(mean, 0.2 * t)[1] == pytest.approx(0.2 * (t - behind))
+    # Drawn out in the first step, and held.
+    share = 1.0 - behind[0] / STEP
+    left = (1.0 - share) * np.exp(-(t - STEP) / 2.0)
+    assert marched(mean, np.full(8, 0.3))[1] == pytest.approx(0.3 * (1.0 - left))
+    square = ShapedLaw("odd", "recent_square_of_angle", 1.0, coefficients=(1.0,), memory=2.0)
+    # Of γ² as it changes evenly.
+    assert marched(square, np.sqrt(0.2 * t))[1] == pytest.approx(0.2 * (t - behind))
     largest = ShapedLaw("odd", "recent_largest_angle", reach=1.0, coefficients=(1.0,), memory=2.0)
     back = np.concatenate([[0.3], np.zeros(7)])
     assert marched(largest, back)[1] == pytest.approx(0.3 * np.exp(-(t - STEP) / 2.0))
     # The work of a spring that is drawn out at an even rate and then held.
     out = np.append(0.2 * t[:4], [0.2 * t[3]] * 4)
-    power = np.append(0.2 * out[:4], np.zeros(4))
+    power = np.append(0.2 * (out[:4] - 0.1 * STEP), np.zeros(4))
     expected = [0.0]
     for new in power:
         left = np.exp(-STEP / 2.0)

@@ -53,7 +53,7 @@ def diagnose_test(
     if found.curve is not None:
         return found
     if search.gave_way and further.found is not None:
-        if further.may_be_more:
+        if further.may_be_more or further.doubtful_noise:
             further.most = None
             further.run()
         return _beside(further.found, found)

@@ -335,7 +335,8 @@ class CrossheadTest:
         travels = [v for v in mine if v.travel is not None]
         travel = self._recorded.travel(travels[0] if travels else None, values)
         for v in (v for v in mine if v.added_travel is not None):
-            travel = self._recorded.moved(travel, self._ahead(v, travel, mine, values))
+            ahead = self._ahead(v, travel, mine, values)
+            travel = self._recorded.moved(travel, v, ahead, values)
         whole = self._force(travel, mine, values)
         zeros: list[tuple[Flags, Array]] = []
         cell = Varying(np.asarray(self._on_the_load_cell))

@@ -23,6 +23,8 @@ Array = npt.NDArray[np.float64]
 BY_TRAVEL = "travel"
 #: Share of what was off before that is too much of it.
 LITTLE_NEARER = 0.5
+#: What the crosshead itself tells at each point, and how fast that changes.
+OF_ITSELF = ("displacement", "time")
 #: Readings of a run that tell nothing of an acceleration, and those that tell it at its ends.
 FEWEST, END = 3, 5
 
@@ -104,10 +106,21 @@ class RecordedRig:
             "acceleration": lambda: self.acceleration,
             "force": lambda: force,
             "force_rate": lambda: self.per_second(force),
+            "displacement_before": lambda: self._before(self.points["D"]),
+            "force_before": lambda: self._before(force),
             "per_time": lambda: self.points["per_time"],
             "run": lambda: self.each(self.before),
             **{name: partial(self.given.__getitem__, name) for name in self.given},
         }
+
+    def _before(self, x: Varying) -> Varying:
+        """Something at the point before each; at the first its own."""
+
+        def shifted(values: Array) -> Array:
+            values = spread(values, self.points["D"].value.shape)
+            return np.concatenate([values[:1], values[:-1]])
+
+        return Varying(shifted(x.value), {p: shifted(slope) for p, slope in x.slopes.items()})
 
     def each(self, numbers: Array) -> Varying:
         """A number of each run at its points."""
@@ -167,12 +180,34 @@ class RecordedRig:
             before / (after * both),
         )
 
-    def moved(self, travel: Any, ahead: Varying) -> dict[str, Varying]:
-        """A travel with what is added to it, and its rate."""
-        return {
-            "D": travel["D"] + ahead,
-            "D_rate": travel["D_rate"] + self.per_second(ahead),
-        }
+    def moved(
+        self, travel: Any, variant: FrameVariant, ahead: Varying, values: Mapping[str, float]
+    ) -> dict[str, Varying]:
+        """A travel with what a form adds to it, and its rate.
+
+        By the place or the time alone that is as the form has it, however much changes from one
+        point to the next; but for a power, whose rate may be infinite where it begins.
+        """
+        steep = variant.shape is not None and variant.shape.fixed.get("shape") == "power sides"
+        if variant.remembered is None and set(variant.of) <= set(OF_ITSELF) and not steep:
+            faster = self._faster(variant, values)
+        else:
+            faster = self.per_second(ahead)
+        return {"D": travel["D"] + ahead, "D_rate": travel["D_rate"] + faster}
+
+    def _faster(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
+        """How fast what a form adds to the travel changes, by the place or the time [mm/s]."""
+        key = (variant, "faster")
+        if key not in self._compiled:
+            assert variant.added_travel is not None
+            marched = Marched((*variant.of, "speed"), tuple(p.name for p in variant.parameters))
+            at = marched.at
+            ahead = variant.added_travel(at, at)
+            rate = {"displacement": at["speed"], "time": 1.0}
+            faster = sum(derivative_of(ahead, at[name]) * rate[name] for name in variant.of)
+            self._compiled[key] = marched.define({"faster": faster}, {})
+        known = {"displacement": self.points["D"], "time": self._since_start}
+        return self._compiled[key](known | {"speed": self.points["D_rate"]}, values)["faster"]
 
     def reading(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
         """What a form's load cell adds by the time [N]."""

@@ -43,17 +43,23 @@ def kept(per_time: Any, memory: Any) -> Any:
     return exp(-1 / (per_time * memory))
 
 
-def recent(x: Any, past: Any, per_time: Any, memory: Any) -> Any:
+def recent(x: Any, past: Any, per_time: Any, memory: Any, before: Any = None) -> Any:
     """Mean of x over the last τ, the latest counting most: τ ds/dt = x − s.
+
+    Exact where x changes evenly within the step, or is what it is at its end.
 
     Args:
         x: at the end of the step.
         past: s before it.
         per_time: 1/Δt [1/s].
         memory: τ [s].
+        before: x before the step; None: as at its end.
     """
     left = kept(per_time, memory)
-    return left * past + (1 - left) * x
+    mean = left * past + (1 - left) * x
+    if before is None:
+        return mean
+    return mean - (x - before) * (memory * per_time * (1 - left) - left)
 
 
 def _relative(at: Crossing, largest: Any) -> Any:
@@ -112,21 +118,23 @@ VARIABLES: dict[str, Callable[[Crossing, Any, Any, Any], Any]] = {
     "since_reversal": lambda at, past, memory, wear: size_of(way(at, past)),
     "time": lambda at, past, memory, wear: past + 1 / at.per_time,
     "unloading": lambda at, past, memory, wear: _unloading(at, past),
-    "recent_angle": lambda at, past, memory, wear: recent(at.size, past, at.per_time, memory),
+    "recent_angle": lambda at, past, memory, wear: recent(
+        at.size, past, at.per_time, memory, size_of(at.gamma_n)
+    ),
     "recent_largest_angle": lambda at, past, memory, wear: max_value(
         past * kept(at.per_time, memory), at.size
     ),
     "recent_rate": lambda at, past, memory, wear: recent(
-        size_of(at.rate), past, at.per_time, memory
+        size_of(at.change) * at.per_time, past, at.per_time, memory
     ),
     "recent_square_of_angle": lambda at, past, memory, wear: recent(
-        at.gamma**2, past, at.per_time, memory
+        at.gamma**2, past, at.per_time, memory, at.gamma_n**2
     ),
     "recent_square_of_rate": lambda at, past, memory, wear: recent(
         at.rate**2, past, at.per_time, memory
     ),
     "recent_work": lambda at, past, memory, wear: recent(
-        size_of(at.gamma * at.rate), past, at.per_time, memory
+        size_of(at.gamma**2 - at.gamma_n**2) * at.per_time / 2, past, at.per_time, memory
     ),
     "broken": broken,
     "healed": healed,

@@ -87,7 +87,7 @@ def _itself(name: str, at: Values) -> Any:
 
 
 def _mean(name: str, at: Values, past: Any, memory: Any) -> Any:
-    return recent(at[name], past, at["per_time"], memory)
+    return recent(at[name], past, at["per_time"], memory, at[f"{name}_before"])
 
 
 def _lag(name: str, at: Values) -> Any:
@@ -104,7 +104,7 @@ RIG_VARIABLES = {
     for name in ("displacement", "force", "speed", "acceleration", "force_rate", "time", "run")
 } | {
     "recent_force": RigVariable(
-        ("force", "per_time"), partial(_itself, "memory"), partial(_mean, "force")
+        ("force", "force_before", "per_time"), partial(_itself, "memory"), partial(_mean, "force")
     ),
     "largest_force": RigVariable(
         ("force",),
@@ -124,10 +124,12 @@ RIG_VARIABLES = {
     "force_size": RigVariable(("force",), lambda at: size_of(at["force"])),
     "speed_size": RigVariable(("speed",), lambda at: size_of(at["speed"])),
     "force_lag": RigVariable(
-        ("force", "per_time"), partial(_lag, "force"), partial(_mean, "force")
+        ("force", "force_before", "per_time"), partial(_lag, "force"), partial(_mean, "force")
     ),
     "displacement_lag": RigVariable(
-        ("displacement", "per_time"), partial(_lag, "displacement"), partial(_mean, "displacement")
+        ("displacement", "displacement_before", "per_time"),
+        partial(_lag, "displacement"),
+        partial(_mean, "displacement"),
     ),
     "force_per_width": RigVariable(("force", "width"), _per_width),
     "largest_force_per_width": RigVariable(

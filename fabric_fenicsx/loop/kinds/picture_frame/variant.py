@@ -29,9 +29,10 @@ class FrameVariant(Variant):
         added_travel: by how much the frame is ahead of the crosshead [mm], from the same.
         of: of "time" in the run [s], the crosshead's "displacement" [mm], "speed" [mm/s] and
             "acceleration" [mm/s²], the "force" [N] of the model and its "force_rate" [N/s], and
-            "per_time", 1 over the step from the point before [1/s], and "run", how many there were
-            before in its folder; of strips their "width" and "free_length", by which they are
-            longer than wide [mm], and "pinned_angle", that of the middle if nothing slips [rad].
+            "per_time", 1 over the step from the point before [1/s], "displacement_before" and
+            "force_before" there, and "run", how many there were before in its folder; of strips
+            their "width" and "free_length", by which they are longer than wide [mm], and
+            "pinned_angle", that of the middle if nothing slips [rad].
         remembered: what ``added_reading`` and ``added_travel`` find as "memory" among these, from
             the parameters, the others, and its value at the point before; 0 before the first.
         variable: what a term without a formula depends on, from these; by default the first.
