@@ -262,12 +262,18 @@ class Models:
         models = each_by_itself(self.experiment, lambda one: self.judge.weighed(*one), taken, known)
         return sorted(models, key=lambda m: m.criterion)
 
-    def refined(self, model: Model) -> Model:
-        """A model fitted again with its own noise and scatter; the old one if there is none."""
+    def refined(self, model: Model, best: float = float("inf")) -> Model:
+        """A model fitted again with its own noise and scatter; the old one if there is none.
+
+        Args:
+            model: the model.
+            best: criterion beside which one that is far behind need not be exact.
+        """
+        near = model.criterion <= best + REFINED_WITHIN
         for last in (False, True):
             variances = self.judge.averaged(model) if last else model.estimate.variances
             try:
-                if not last:
+                if near and not last:
                     self.experiment.settle(model.fit.variants, model.fit.values)
                 model = self._again(model, variances, CRITERIA.evaluations)
             except SolveError:
@@ -280,12 +286,12 @@ class Models:
         known = self._known_to_all([model.fit for model in models], more)
         return each_by_itself(self.experiment, self.refined, models, known)
 
-    def of_one_each(self, fits: Sequence[tuple[Effect, Fit]]) -> list[Model]:
+    def of_one_each(self, fits: Sequence[tuple[Effect, Fit]], best: float) -> list[Model]:
         """Models of one effect each, from their fits; see refined."""
 
         def made(one: tuple[Effect, Fit]) -> Model:
             effect, model = one
-            return self.refined(self.judge.weighed(model, (effect,)))
+            return self.refined(self.judge.weighed(model, (effect,)), best)
 
         known = self._known_to_all([model for _, model in fits], [effect for effect, _ in fits])
         return each_by_itself(self.experiment, made, fits, known)

@@ -110,7 +110,8 @@ class Search:
         rivals = rivals_of(self.models, final, in_their_place)
         fitted = [(c, c.fit) for c in candidates if c.fit is not None]
         # Those far behind have not got their own noise and scatter yet.
-        own = self.models.of_one_each([(c.effect, fit) for c, fit in fitted])
+        pairs = [(c.effect, fit) for c, fit in fitted]
+        own = self.models.of_one_each(pairs, nearest.criterion)
         for (candidate, _), model in zip(fitted, own, strict=True):
             candidate.fit, candidate.criterion = model.fit, model.criterion
             candidate.holdout = self.judge.holdout(model.fit)

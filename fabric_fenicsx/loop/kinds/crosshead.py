@@ -244,7 +244,7 @@ class CrossheadTest:
         if variant.by_run is not None and variant.shape is not None and not variant.shape.also:
             return self._recorded.at_readings(self._recorded.each(self._before["specimen"]).value)
         if variant.laws is None:
-            whole = self._acting(self._force(self._points, (), values))
+            whole = self._load(self._points, (), values)
             if variant.variable is None:
                 found = self._recorded.known(whole)[variant.of[0]]()
             else:
@@ -406,8 +406,18 @@ class CrossheadTest:
         by: Collection[str] | None = None,
     ) -> Varying:
         """What a form adds to the travel [mm] by the force at a travel; see _force."""
-        force = self._acting(self._force(travel, variants, values, by))
+        force = self._load(travel, variants, values, by)
         return self._recorded.added(variant, "travel", force, values)
+
+    def _load(
+        self,
+        travel: Any,
+        variants: Sequence[FrameVariant],
+        values: Mapping[str, float],
+        by: Collection[str] | None = None,
+    ) -> Varying:
+        """Force that acts on the rig, and on what is in series with it [N]; see _force."""
+        return self._acting(self._force(travel, variants, values, by))
 
     def _force(
         self,

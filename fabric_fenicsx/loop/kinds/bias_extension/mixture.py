@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from ...expressions.marching import Varying
 from ...kept import Kept
-from .phases import Phase, Phases
-from .solved import GROUPS, Name, Solved
+from .phases import Parted, Phase
+from .solved import GROUPS, Name, Solved, polynomial
 
 __all__ = ["Part", "Travels", "number", "of_groups", "of_ways"]
 
@@ -49,7 +49,7 @@ class Travels:
 
     Args:
         D: travels [mm], (n_points, n_runs).
-        phase: what the crossheads do there, (n_points, n_runs).
+        parted: the points at which each run's crosshead does what; see phases.parted.
         of: runs whose crossings are wanted; by default all.
         kept: whether all that strips say is kept: of travels that are asked for again and again.
     """
@@ -57,16 +57,17 @@ class Travels:
     def __init__(
         self,
         D: Array,
-        phase: Phases,
+        parted: Parted,
         of: Sequence[int] | npt.NDArray[np.int64] | None = None,
         *,
         kept: bool = False,
     ) -> None:
-        self._D, self._phase = D, phase
-        self._stops = bool((phase == Phase.STOPPED).any())
+        self._D, self._parted = D, parted
+        self._stops = any(one == Phase.STOPPED for own in parted for one, _ in own)
         self._runs = range(D.shape[1]) if of is None else of
         most = min(KEPT, MOST_NUMBERS // max(D.size * GROUPS, 1)) if kept else FEW
         self._known: Kept[Array] = Kept(most)
+        self._pieces: Kept[tuple[Array, Array]] = Kept(1 if kept else FEW)
 
     def of(self, solved: Solved, name: Name, order: int = 0) -> Array:
         """Angles and levers of all groups, rests or middles, or derivatives in D.
@@ -82,12 +83,27 @@ class Travels:
         return self._known(asked, (), lambda: self._evaluated(*asked))
 
     def _evaluated(self, solved: Solved, name: Name, order: int) -> Array:
-        runs = self._runs if name in ("gamma", "lever") else range(len(solved.ways))
-        D, phase = self._D, self._phase
-        own = [solved.ways[r].at(name, D[:, r], phase[:, r], order) for r in runs]
-        found = np.column_stack(own)
+        pieces, s = self._pieces((solved, name), (), lambda: self._cubics(solved, name))
+        found = polynomial(pieces, s, order).reshape(len(self._D), -1)
         found.flags.writeable = False
         return found
+
+    def _cubics(self, solved: Solved, name: Name) -> tuple[Array, Array]:
+        """Coefficients of the cubics that travels are on, the highest first, and how far on [mm].
+
+        Returns:
+            (4, n_points, n_runs, n_groups) and (n_points, n_runs, 1).
+        """
+        of_groups = name in ("gamma", "lever")
+        runs = self._runs if of_groups else range(len(solved.ways))
+        pieces = np.empty((4, len(self._D), len(runs), GROUPS if of_groups else 1))
+        s = np.empty((*pieces.shape[1:3], 1))
+        for k, r in enumerate(runs):
+            for one, points in self._parted[r]:
+                own, on = solved.ways[r].cubics(name, one, self._D[points, r])
+                pieces[:, points, k] = own.reshape(4, len(points), -1)
+                s[points, k, 0] = on
+        return pieces, s
 
 
 def of_groups(

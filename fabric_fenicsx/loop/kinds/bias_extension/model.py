@@ -40,7 +40,7 @@ from .even_shear import EVEN, IN_WORDS, EvenZones, of_both
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
 from .going import columns_of, gone
 from .mixture import Part, Travels, number, of_ways
-from .phases import GONE_BACK, Phase, backward, moving, phases_of, speed_out
+from .phases import GONE_BACK, Phase, backward, moving, parted, phases_of, speed_out
 from .quantities import coarser, first_curve, read_together, strip_of
 from .settled import Correction, Quantity, correction
 from .solved import GROUPS, Solved, SolvedStrips, Wanted, reached
@@ -237,7 +237,8 @@ class BiasExtension(CrossheadTest):
             for run, force in enumerate(self._parent)
         ]
         self._going_runs, self._goes_as = np.unique(goes_as, return_inverse=True)
-        self._recorded_travels = Travels(D, self._phase, self._going_runs, kept=True)
+        self._parted = parted(self._phase)
+        self._recorded_travels = Travels(D, self._parted, self._going_runs, kept=True)
 
         def going(solved: Solved) -> dict[str, Varying]:
             parts = [Part(solved, number(1.0))]
@@ -492,7 +493,7 @@ class BiasExtension(CrossheadTest):
         """Travels of a model; most have those of the crossheads."""
         if D is self._points["D"]:
             return self._recorded_travels
-        return Travels(D.value, self._phase, self._going_runs)
+        return Travels(D.value, self._parted, self._going_runs)
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]
@@ -521,12 +522,7 @@ class BiasExtension(CrossheadTest):
         values: Mapping[str, float],
         by: Collection[str] | None = None,
     ) -> Varying:
-        self._mixture = self._mixed(variants, values)
-        whole = super()._force(travel, variants, values, by)
-        D, travels = travel["D"], self._travels(travel["D"])
-        rest = of_ways(self._mixture, travels, D.slopes, "rest")
-        rest += self._correction(variants, travel, "force")
-        found = self._pull = whole + rest * self._of_net(values)
+        found = self._pull = self._load(travel, variants, values, by)
         if not self._angles.any():
             return found
         # Of runs of angles nothing else counts.
@@ -539,6 +535,20 @@ class BiasExtension(CrossheadTest):
                 for p in found.slopes | angles.slopes
             },
         )
+
+    def _load(
+        self,
+        travel: Any,
+        variants: Sequence[FrameVariant],
+        values: Mapping[str, float],
+        by: Collection[str] | None = None,
+    ) -> Varying:
+        self._mixture = self._mixed(variants, values)
+        whole = super()._force(travel, variants, values, by)
+        D, travels = travel["D"], self._travels(travel["D"])
+        rest = of_ways(self._mixture, travels, D.slopes, "rest")
+        rest += self._correction(variants, travel, "force")
+        return whole + rest * self._of_net(values)
 
     def _of_net(self, values: Mapping[str, float]) -> Varying:
         """Share of the strip that does not shear evenly."""

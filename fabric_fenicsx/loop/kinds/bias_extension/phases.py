@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import IntEnum
 
 import numpy as np
@@ -10,10 +11,12 @@ import numpy.typing as npt
 __all__ = [
     "GONE_BACK",
     "SIGN",
+    "Parted",
     "Phase",
     "Phases",
     "backward",
     "moving",
+    "parted",
     "phases_of",
     "speed_out",
 ]
@@ -37,6 +40,21 @@ class Phase(IntEnum):
     """
 
     OUT, BACK, STOPPED = range(3)
+
+
+Parted = Sequence[Sequence[tuple[Phase, npt.NDArray[np.int64]]]]
+"""Of each run what its crosshead does, and the numbers of the points where it does."""
+
+
+def parted(phases: Phases) -> Parted:
+    """The points of each run by what its crosshead does there.
+
+    Args:
+        phases: (n_points, n_runs).
+    """
+    return [
+        [(Phase(one), np.flatnonzero(run == one)) for one in np.unique(run)] for run in phases.T
+    ]
 
 
 def moving(speed: Array) -> Array:

@@ -12,7 +12,7 @@ from scipy.interpolate import PchipInterpolator
 
 from ...expressions.marching import Varying
 from .mixture import Part, Travels, of_groups, of_ways
-from .phases import SIGN, Phase, Phases
+from .phases import SIGN, Phase, Phases, parted
 from .solved import Solved
 
 __all__ = ["Correction", "Quantity", "correction"]
@@ -68,7 +68,7 @@ def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Corr
     off: dict[str, list[list[PchipInterpolator]]] = {"force": [], "middle": []}
     for one in Phase:
         phase = np.full(D.shape, one, dtype=np.int8)
-        travels = Travels(D, phase)
+        travels = Travels(D, parted(phase))
         gamma, lever = (
             of_groups(foretold, travels, name).value.reshape(*D.shape, -1)
             for name in ("gamma", "lever")

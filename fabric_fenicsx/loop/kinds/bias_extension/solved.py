@@ -8,6 +8,7 @@ where none is near. All that has to be solved for one model is solved at once, i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -33,6 +34,7 @@ __all__ = [
     "SolvedStrips",
     "Wanted",
     "Way",
+    "polynomial",
     "reached",
 ]
 
@@ -58,6 +60,33 @@ Task = tuple[str, Curve, bool]
 """A whole case, a curve, and whether the strip is wanted as it stands still."""
 
 
+def polynomial(coefficients: Array, s: Array, order: int) -> Array:
+    """Cubics, or a derivative of them.
+
+    Args:
+        coefficients: the highest first, (4, ...).
+        s: where, which broadcasts against one of them.
+        order: of the derivative.
+    """
+    degree = len(coefficients) - 1
+    found = np.zeros(np.broadcast_shapes(coefficients.shape[1:], s.shape))
+    for power in range(degree, order - 1, -1):
+        found = found * s + math.perm(power, order) * coefficients[degree - power]
+    return found
+
+
+def _pieces(of: PchipInterpolator, D: Array) -> tuple[Array, Array]:
+    """See Way.cubics; the first and the last piece go on."""
+    k = np.maximum(np.minimum(np.searchsorted(of.x, D, side="right"), len(of.x) - 1) - 1, 0)
+    return of.c[:, k], D - of.x[k]
+
+
+def _slope_of(coefficients: Array, on: Array) -> tuple[Array, Array]:
+    """The same of the derivative."""
+    a, b, c, _ = coefficients
+    return np.stack([np.zeros_like(a), 3.0 * a, 2.0 * b, c]), on
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Stopped:
     """One run's strip as it stands still, of the travel; see Way."""
@@ -66,10 +95,6 @@ class Stopped:
     lever: PchipInterpolator
     rest: PchipInterpolator
     middle: PchipInterpolator
-
-    def along(self, name: Name, D: Array, order: int) -> Array:
-        """Of one quantity, or a derivative in D, at travels [mm], (n, ...)."""
-        return np.asarray(getattr(self, name)(D, order))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,18 +128,28 @@ class Way:
             phase: what the crosshead does there, (n,).
             order: of a derivative in D.
         """
-        others = {Phase.BACK: self.back, Phase.STOPPED: self.stopped}
         found = np.empty((len(D), *(self.area.shape if name in ("gamma", "lever") else ())))
         for one in np.unique(phase):
             rows = phase == one
-            found[rows] = (others.get(one) or self).along(name, D[rows], order)
+            pieces, on = self.cubics(name, one, D[rows])
+            found[rows] = polynomial(pieces, on.reshape(-1, *[1] * (found.ndim - 1)), order)
         return found
 
-    def along(self, name: Name, D: Array, order: int) -> Array:
-        """The same of the way out by itself."""
-        if name == "lever":
-            return np.asarray(self.gamma(D, order + 1))
-        return np.asarray(getattr(self, name)(D, order))
+    def cubics(self, name: Name, phase: int, D: Array) -> tuple[Array, Array]:
+        """Coefficients of the cubics that travels are on, the highest first, and how far on [mm].
+
+        Args:
+            name: as for ``at``.
+            phase: what the crosshead does at all of them.
+            D: travels, (n,).
+
+        Returns:
+            (4, n, ...) and (n,).
+        """
+        own = {Phase.BACK: self.back, Phase.STOPPED: self.stopped}.get(Phase(phase)) or self
+        if isinstance(own, Way) and name == "lever":
+            return _slope_of(*_pieces(own.gamma, D))
+        return _pieces(getattr(own, name), D)
 
     def force(self, D: Array, phase: Phases, curve: Curve) -> Array:
         """Force [N] of a strip that goes as it was solved, with a curve, at some travels, (n,)."""
