@@ -13,6 +13,7 @@ from fabric_fenicsx.loop.inference import one_search
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
 from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.models import Models
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.one_search import Search
@@ -296,6 +297,27 @@ def test_a_term_is_looked_for_before_several_effects_with_names(
     assert bool(with_names_alone) == tried
 
 
+@pytest.mark.parametrize("doubtful", [True, False])
+def test_a_term_that_leaves_doubtful_noise_is_not_all(monkeypatch, doubtful):
+    """Although effects with names leave far more together: others are tried beside it."""
+    names = [f"c{k}" for k in range(2, 6)]
+    columns = {n: lambda t, k=k: np.sin(k * t) for k, n in enumerate(names, 3)}
+    columns["kink"] = lambda t: np.where(t > 0.5, np.sin(40.0 * t), 0.0)
+    columns["hum"] = lambda t: np.cos(90.0 * t)
+    test = made(columns, columns["kink"], [linear_effect(n) for n in names])
+    test.terms = [linear_effect(n, acts_on="reading") for n in ("kink", "hum")]
+    together = []
+    own = Search._together
+    monkeypatch.setattr(
+        Search, "_together", lambda self, *a: together.append(self.effects) or own(self, *a)
+    )
+    monkeypatch.setattr(Judge, "doubtful_noise", lambda self, model: doubtful)
+    found = diagnose_test(test)
+    assert [e.name for e in found.effects] == ["kink"]
+    assert bool(together) is doubtful
+    assert all(set(test.terms) <= set(effects) for effects in together)
+
+
 def test_more_is_added_to_the_next_term_of_one_variable_as_well():
     effects = [
         replace(linear_effect(name), of_two=name == "product")
@@ -391,3 +413,14 @@ def test_models_that_may_be_the_best_are_refined_together_and_others_left(monkey
     forms = [m.fit.variants for m in first]
     assert len(set(forms)) == len(forms) <= 3
     assert all(m.criterion < weighed[0].criterion + 60.0 for m in first)
+
+
+@pytest.mark.parametrize(("behind", "settled"), [(59.0, 1), (61.0, 0)])
+def test_what_is_far_behind_need_not_be_exact(monkeypatch, behind, settled):
+    test = made({"kink": lambda t: t**2}, lambda t: 3.0 * t**2, [linear_effect("kink")])
+    models = Models(test, test.effects)
+    model = models.weighed([models.base])[0]
+    asked = []
+    monkeypatch.setattr(test, "settle", lambda *of: asked.append(of))
+    models.refined(model, model.criterion - behind)
+    assert len(asked) == settled

@@ -54,7 +54,7 @@ class StripPullVariant(FrameVariant):
 # Of the second starts the strips that are softest by far are not solved; see ``solved_at``.
 SLIP = Parameter(
     "slip_1_N",
-    (1.0, 2.4),
+    (1.0, 2.0),
     0.0,
     10.0,
     amplitude=True,
