@@ -13,7 +13,7 @@ from ...mechanics.scalars import derivative_of
 from ..expressions.marching import Marched, Varying, spread
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
-from .records import laid_out
+from .records import laid_out, one_point_before
 
 __all__ = ["RecordedRig", "left_by"]
 
@@ -106,21 +106,12 @@ class RecordedRig:
             "acceleration": lambda: self.acceleration,
             "force": lambda: force,
             "force_rate": lambda: self.per_second(force),
-            "displacement_before": lambda: self._before(self.points["D"]),
-            "force_before": lambda: self._before(force),
+            "displacement_before": lambda: one_point_before(self.points["D"]),
+            "force_before": lambda: one_point_before(force),
             "per_time": lambda: self.points["per_time"],
             "run": lambda: self.each(self.before),
             **{name: partial(self.given.__getitem__, name) for name in self.given},
         }
-
-    def _before(self, x: Varying) -> Varying:
-        """Something at the point before each; at the first its own."""
-
-        def shifted(values: Array) -> Array:
-            values = spread(values, self.points["D"].value.shape)
-            return np.concatenate([values[:1], values[:-1]])
-
-        return Varying(shifted(x.value), {p: shifted(slope) for p, slope in x.slopes.items()})
 
     def each(self, numbers: Array) -> Varying:
         """A number of each run at its points."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...mechanics.laws.law import Crossing
-from ..expressions.marching import Marched, Varying
+from ..expressions.marching import Marched, Varying, spread
 from ..inference.experiment import Readings
 from .picture_frame.motion import Motion
 
@@ -23,6 +23,7 @@ __all__ = [
     "laid_out",
     "last_run",
     "of_a_crossing",
+    "one_point_before",
     "runs_before",
     "shifted",
     "typical",
@@ -128,3 +129,10 @@ def _remembered(marched: Marched, number: int, name: str) -> Any:
 def shifted(values: Array) -> Array:
     """At the point before; at the first point the value there."""
     return np.concatenate([values[:1], values[:-1]])
+
+
+def one_point_before(x: Varying) -> Varying:
+    """The same of what depends on parameters."""
+    shape = x.value.shape
+    slopes = {p: shifted(spread(slope, shape)) for p, slope in x.slopes.items()}
+    return Varying(shifted(x.value), slopes)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...expressions.marching import Varying
-from ..records import shifted
+from ..records import one_point_before
 from .even_shear import SHARES, ZONES, EvenZones, beside, in_zones
 from .mixture import Part, Travels, of_groups
 from .solved import GROUPS
@@ -70,7 +70,7 @@ def gone(
     )
     return {
         "gamma": gamma,
-        "gamma_n": Varying(shifted(gamma.value), {p: shifted(s) for p, s in gamma.slopes.items()}),
+        "gamma_n": one_point_before(gamma),
         "rate": lever * pace,
         "per_time": Varying(each(motion["per_time"].value, columns)),
         "rate_per_speed": lever,

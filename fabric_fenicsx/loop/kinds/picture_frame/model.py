@@ -27,7 +27,7 @@ from ...inference.effects import Effect, Variant
 from ...inference.experiment import OneCurve
 from ...measurement.schema import Measurement, Run
 from ..crosshead import CrossheadTest
-from ..records import last_run, shifted
+from ..records import last_run, one_point_before
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
 from .products import products
@@ -191,9 +191,7 @@ class PictureFrame(CrossheadTest):
         shape = travel["D"].value.shape
         rig = {name: Varying(np.broadcast_to(v.value, shape)) for name, v in self._rig.items()}
         known = dict(self._compiled["kinematics"]({**travel, **rig}, values))
-        gamma = known["gamma"]
-        before = Varying(shifted(gamma.value), {p: shifted(s) for p, s in gamma.slopes.items()})
-        known |= {"gamma_n": before, "per_time": self._points["per_time"]}
+        known |= {"gamma_n": one_point_before(known["gamma"]), "per_time": self._points["per_time"]}
         if travel is self._points:
             self._still = known
         return known
