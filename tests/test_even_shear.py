@@ -13,14 +13,14 @@ from scipy.optimize import brentq
 
 from fabric_fenicsx.loop.expressions.marching import Varying
 from fabric_fenicsx.loop.inference.models import Models
-from fabric_fenicsx.loop.kinds import crosshead
+from fabric_fenicsx.loop.kinds import slipping
 from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig
 from fabric_fenicsx.loop.kinds.bias_extension.even_shear import EVEN
 from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
 from fabric_fenicsx.loop.kinds.bias_extension.proposals import proposals
 from fabric_fenicsx.loop.kinds.bias_extension.quantities import coarser
 from fabric_fenicsx.loop.kinds.bias_extension.strip import strip_case
-from fabric_fenicsx.loop.kinds.recorded_rig import left_by
+from fabric_fenicsx.loop.kinds.slipping import left_by
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 
 LAW = {"k1_N": 0.03, "k3_N": 0.1, "c1_N_s": 0.05}
@@ -196,7 +196,7 @@ def test_what_slips_is_looked_for_once_beside_next_to_nothing_of_other_forms(str
     (amount,) = (p.name for p in friction.amplitudes)
     asked = []
     monkeypatch.setattr(
-        crosshead, "left_by", lambda *a, f=crosshead.left_by: asked.append(a) or f(*a)
+        slipping, "left_by", lambda *a, f=slipping.left_by: asked.append(a) or f(*a)
     )
     alone, slopes = strips.predict([slip], values)
     beside, more = strips.predict([slip, friction], {**values, amount: 1e-9})
@@ -215,6 +215,26 @@ def test_what_slips_is_looked_for_once_beside_next_to_nothing_of_other_forms(str
     assert 0.6 < np.linalg.norm(change) / np.linalg.norm(by) <= 1.05
     strips.predict([slip], {**values, "k1_N": 0.031})
     assert len(asked) == 3
+
+
+def test_what_slips_is_looked_for_again_where_strips_were_solved_anew(strips, monkeypatch):
+    """What slips goes by the force as it is foretold, which changes then."""
+    own = BiasExtension([measured(made_up(SIZES[0], 0), made_up(SIZES[1], 1))], like=strips)
+    (slip,) = (v for v in forms(own, "crossover_slip") if v.label.startswith("of the strip"))
+    values = {**LAW, EVEN.name: 0.3, "slip_mm_N": 0.5, "slip_from_N_mm": 0.01}
+    asked = []
+    monkeypatch.setattr(
+        slipping, "left_by", lambda *a, f=slipping.left_by: asked.append(a) or f(*a)
+    )
+    before, _ = own.predict([slip], values)
+    own.settle([slip], values)
+    after, _ = own.predict([slip], values)
+    assert len(asked) == 2
+    assert not np.array_equal(after, before)
+    # Where nothing is solved anew what slips is known.
+    own.settle([slip], values)
+    assert np.array_equal(own.predict([slip], values)[0], after)
+    assert len(asked) == 2
 
 
 def test_what_a_force_leaves_is_found_where_it_falls_steeply():

@@ -27,15 +27,15 @@ from ...mechanics.laws.springs import PolynomialSpring
 from ..expressions.marching import MOST_KEPT, Marched, Varying, spread
 from ..inference.effects import Effect, Variant, of_each, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
-from ..inference.first_order import SMALL
 from ..inference.noise import estimated_noise
 from ..kept import Kept
 from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
-from .recorded_rig import RecordedRig, left_by
+from .recorded_rig import RecordedRig
 from .records import of_a_crossing, runs_before, typical
+from .slipping import Slips
 
 __all__ = ["CrossheadTest"]
 
@@ -48,8 +48,6 @@ BASELINE = (
     Parameter("c1_N_s", (0.0,), 0.0, meaning="dashpot, moment per area and rate"),
 )
 
-#: Models of which it is kept what slipped.
-SLIPS = 4
 #: Share of the largest size below which a reading on the other side of 0 is none.
 LITTLE = 0.05
 
@@ -87,8 +85,7 @@ class CrossheadTest:
         #: Angles and rates of a rig that follows the crosshead, and the moments last made of them.
         self._still: dict[str, Varying] | None = None
         self._kept_moments: Kept[Varying] = Kept(MOST_KEPT)
-        #: What forms that slip added to the travel, beside which forms with which parameters.
-        self._slips: dict[FrameVariant, list[tuple[Any, dict[str, float], Varying]]] = {}
+        self._slips = Slips()
         self._recorded = RecordedRig(motions, self._compiled)
         self._points = self._recorded.points
         self._set_up(runs)
@@ -345,7 +342,10 @@ class CrossheadTest:
             if v.added_reading is not None:
                 read += cell * self._recorded.added(v, "reading", self._acting(whole), values)
             if v.reading is not None and v.each_run:
-                added, own_zeros = self._each_run(v, values, read.value)
+                left = self.readings.observed - self._recorded.at_readings(read.value)
+                of_cell = np.broadcast_to(self._on_the_load_cell, read.value.shape[1:])
+                runs = np.flatnonzero(of_cell)
+                added, own_zeros = self._recorded.of_each_run(v, values, left, self.readings, runs)
                 read += cell * added
                 zeros += own_zeros
             elif v.reading is not None:
@@ -373,29 +373,14 @@ class CrossheadTest:
     ) -> Varying:
         """What a form adds to the travel [mm].
 
-        What is little goes by the force with the travel as it would be without. Otherwise it takes
-        several, and is kept: beside next to nothing of thousands of other forms it is the same, and
-        what these would have to do with it is left to where there is more of them.
+        What is little goes by the force with the travel as it would be without.
         """
         added = partial(self._added_travel, variant, variants, values)
         if not variant.rounds:
             return added(travel)
-        for forms, numbers, known in self._slips.get(variant, ()):
-            others = [v for v in variants if v not in forms]
-            same = len(others) + len(forms) == len(variants)
-            if (
-                same
-                and all(v.travel is None and v.added_travel is None for v in others)
-                and all(abs(values[p.name]) <= SMALL for v in others for p in v.amplitudes)
-                and all(values[name] == number for name, number in numbers.items())
-            ):
-                return known
-        found = left_by(added, travel, variant.rounds)
         names = [p.name for p in (*self.baseline, *(p for v in variants for p in v.parameters))]
-        numbers = {name: values[name] for name in names if name in values}
-        before = [one for one in self._slips.get(variant, ()) if one[0] != tuple(variants)]
-        self._slips[variant] = [(tuple(variants), numbers, found), *before[: SLIPS - 1]]
-        return found
+        own = {name: values[name] for name in names if name in values}
+        return self._slips.of(variant, variants, own, added, travel)
 
     def _added_travel(
         self,
@@ -527,43 +512,3 @@ class CrossheadTest:
             # One fitted run cannot tell the two apart: nothing is claimed of the other runs.
             shared = [v for v in shared if getattr(v, "reading", None) is None]
         return replace(effect, variants=tuple(of_each(v, runs, ()) for v in (*shared, *each)))
-
-    def _each_run(
-        self, variant: FrameVariant, values: Mapping[str, float], force: Array
-    ) -> tuple[Varying, list[tuple[Flags, Array]]]:
-        """What the load cell adds; in a run that is not fitted, what fits best to what is left.
-
-        That is a zero and a drift, whichever of them the form has: no other run tells them. Also
-        the readings of such runs, flags, and the columns that were fitted to them.
-        """
-        zeros = []
-        assert variant.reading is not None
-        names = dict.fromkeys(p.shared_name for p in variant.parameters)
-        # The form's, not the variant's, which may have parameters of fewer runs.
-        key = variant.reading
-        if key not in self._compiled:
-            unit = Marched(("time",), tuple(names))
-            added = variant.reading(unit.at, unit.at["time"])
-            self._compiled[key] = unit.define({"force": added}, {})
-        added = self._compiled[key](self._points, dict.fromkeys(names, 0.0))["force"]
-        columns = added.slopes
-        shape = self._points["time"].value.shape
-        total, found = np.zeros(shape), {}
-        left = self.readings.observed - self._recorded.at_readings(force)
-        time = self._recorded.at_readings(self._points["time"].value)
-        for run in np.flatnonzero(np.broadcast_to(self._on_the_load_cell, shape[1])):
-            rows = self.readings.run == run
-            if f"run{run + 1}_{next(iter(names))}" in values:
-                for n, c in columns.items():
-                    name, column = f"run{run + 1}_{n}", np.broadcast_to(c, shape)[:, run]
-                    total[:, run] += values[name] * column
-                    found[name] = np.zeros(shape)
-                    found[name][:, run] = column
-            else:
-                rows = rows & self.readings.usable
-                line = np.column_stack([np.ones_like(time), time])
-                J = line[rows]
-                zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
-                zeros.append((rows, J))
-                total[:, run] = zero[0] + zero[1] * self._points["time"].value[:, run]
-        return Varying(total, found), zeros

@@ -11,18 +11,17 @@ import numpy.typing as npt
 
 from ...mechanics.scalars import derivative_of
 from ..expressions.marching import Marched, Varying, spread
+from ..inference.experiment import Readings
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
 from .records import laid_out, one_point_before
 
-__all__ = ["RecordedRig", "left_by"]
+__all__ = ["RecordedRig"]
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+Integers = npt.NDArray[np.int64]
 
-#: Name of the derivative by the travel, beside those by parameters.
-BY_TRAVEL = "travel"
-#: Share of what was off before that is too much of it.
-LITTLE_NEARER = 0.5
 #: What the crosshead itself tells at each point, and how fast that changes.
 OF_ITSELF = ("displacement", "time")
 #: Readings of a run that tell nothing of an acceleration, and those that tell it at its ends.
@@ -210,40 +209,61 @@ class RecordedRig:
             self._compiled[key] = marched.define({"force": added}, {})
         return self._compiled[key](self.points, values)["force"]
 
+    def of_each_run(
+        self,
+        variant: FrameVariant,
+        values: Mapping[str, float],
+        left: Array,
+        readings: Readings,
+        runs: Sequence[int] | Integers,
+    ) -> tuple[Varying, list[tuple[Flags, Array]]]:
+        """What the load cell adds; in a run that is not fitted, what fits best to what is left.
+
+        That is a zero and a drift, whichever of them the form has: no other run tells them.
+
+        Args:
+            variant: with parameters of each fitted run.
+            values: of them.
+            left: what the readings are beyond what is known without it, (n,).
+            readings: all.
+            runs: which a load cell reads.
+
+        Returns:
+            What it adds [N], (n_points, n_runs); of runs that are not fitted their readings, flags,
+            and the columns that were fitted to them.
+        """
+        zeros = []
+        assert variant.reading is not None
+        names = dict.fromkeys(p.shared_name for p in variant.parameters)
+        # The form's, not the variant's, which may have parameters of fewer runs.
+        key = variant.reading
+        if key not in self._compiled:
+            unit = Marched(("time",), tuple(names))
+            force = variant.reading(unit.at, unit.at["time"])
+            self._compiled[key] = unit.define({"force": force}, {})
+        columns = self._compiled[key](self.points, dict.fromkeys(names, 0.0))["force"].slopes
+        shape = self.points["time"].value.shape
+        total, found = np.zeros(shape), {}
+        time = self.at_readings(self.points["time"].value)
+        for run in runs:
+            rows = readings.run == run
+            if f"run{run + 1}_{next(iter(names))}" in values:
+                for n, c in columns.items():
+                    name, column = f"run{run + 1}_{n}", np.broadcast_to(c, shape)[:, run]
+                    total[:, run] += values[name] * column
+                    found[name] = np.zeros(shape)
+                    found[name][:, run] = column
+            else:
+                rows = rows & readings.usable
+                line = np.column_stack([np.ones_like(time), time])
+                J = line[rows]
+                zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
+                zeros.append((rows, J))
+                total[:, run] = zero[0] + zero[1] * self.points["time"].value[:, run]
+        return Varying(total, found), zeros
+
 
 def _bent_at_end(time: Array, values: Array) -> Array:
     """Second derivative at the first two of some places, of the cubic nearest to all of them."""
     cubic = np.polynomial.Polynomial.fit(time, values, 3)
     return np.asarray(cubic.deriv(2)(time[:2]))
-
-
-def left_by(added: Callable[..., Varying], travel: Any, rounds: int) -> Varying:
-    """What is added to a travel by the force that it leaves, x = g(D + x), point by point.
-
-    More travel makes more force, and what slips by it is behind: g falls, so that the one x there
-    is lies between any x and its g. It is looked for by Newton's steps, and half-way between what
-    is left where these lead out of that or get little nearer. The force is that at the speed of the
-    crosshead: what slips takes little of it.
-
-    Args:
-        added: g, from a travel and names of the derivatives that are wanted of it; None: all.
-        travel: at all points.
-        rounds: steps.
-    """
-    D, V = travel["D"], travel["D_rate"]
-    one = np.ones(D.value.shape)
-    x = np.zeros(D.value.shape)
-    low, high, before = (np.full_like(x, value) for value in (-np.inf, np.inf, np.inf))
-    slopes: dict[str, Array] = {}
-    for k in range(rounds):
-        there = {"D": Varying(D.value + x, {**D.slopes, BY_TRAVEL: one}), "D_rate": V}
-        wanted = added(there, None if k == rounds - 1 else (BY_TRAVEL,))
-        off, slopes = wanted.value - x, dict(wanted.slopes)
-        low = np.maximum(low, np.minimum(x, wanted.value))
-        high = np.minimum(high, np.maximum(x, wanted.value))
-        steep = 1.0 / (1.0 - np.minimum(slopes.pop(BY_TRAVEL, np.zeros(())), 0.0))
-        x = x + off * steep
-        far = np.abs(off) > LITTLE_NEARER * before
-        x = np.where((x <= low) | (x >= high) | far, 0.5 * (low + high), x)
-        before = np.abs(off)
-    return Varying(x, {p: slope * steep for p, slope in slopes.items()})

@@ -25,10 +25,10 @@ import numpy.typing as npt
 
 from ...inference.effects import Variant
 from ...inference.experiment import NO_DEVIATIONS, Deviations
-from .effects import StripPullVariant
 from .mixture import Part, number
-from .model import BiasExtension, solved_by
+from .model import BiasExtension
 from .solved import Solved, Wanted, Way
+from .strip_models import pulled, solved_by
 
 __all__ = ["CentredBiasExtension"]
 
@@ -158,9 +158,7 @@ class CentredBiasExtension(BiasExtension):
 
     def _wanted(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Wanted:
         """What a strip is to be solved with."""
-        return _changes(variants, values), self._curve(
-            variants, values, self._moments(variants, values).value
-        )
+        return _changes(variants, values), self._models.curve(variants, values)
 
     def _about_to(
         self, variants: Sequence[Variant], values: Mapping[str, float], solved: Solved
@@ -184,21 +182,16 @@ class CentredBiasExtension(BiasExtension):
         return super()._mixed(variants, values) if self._about is None else self._about
 
 
-def _pulled(variants: Sequence[Variant]) -> list[StripPullVariant]:
-    """Those that strips are solved with."""
-    return [v for v in variants if isinstance(v, StripPullVariant) and v.changes is not None]
-
-
 def _steps(variants: Sequence[Variant], values: Mapping[str, float]) -> dict[str, float]:
     """Changes of amplitudes that derivatives in them are taken over."""
-    parameters = [v.parameters[0] for v in _pulled(variants)]
+    parameters = [v.parameters[0] for v in pulled(variants)]
     return {p.name: STEP * max(values[p.name], OF_START * p.starts[0]) for p in parameters}
 
 
 def _changes(variants: Sequence[Variant], values: Mapping[str, float]) -> dict[str, Any]:
     """Keys of a case with some amplitudes; see StripPullVariant."""
     found: dict[str, Any] = {}
-    for v in _pulled(variants):
+    for v in pulled(variants):
         value = values[v.parameters[0].name]
         if value > 0.0 and v.changes is not None:
             found |= v.changes(value)

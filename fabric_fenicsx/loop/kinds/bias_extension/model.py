@@ -30,11 +30,10 @@ from ...inference.effects import Effect, Variant
 from ...inference.experiment import Readings
 from ...measurement.schema import Measurement, Run
 from ..crosshead import CrossheadTest
-from ..drape.shear_field import hermite_weights
 from ..picture_frame.model import SAME_RATE
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
-from .curves import Moment, at_knots, at_knots_back
+from .curves import Moment, at_knots
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
 from .even_shear import EVEN, IN_WORDS, EvenZones, of_both
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
@@ -42,12 +41,13 @@ from .going import columns_of, gone
 from .mixture import Part, Travels, number, of_ways
 from .phases import GONE_BACK, Phase, backward, moving, parted, phases_of, speed_out
 from .quantities import coarser, first_curve, read_together, strip_of
-from .settled import Correction, Quantity, correction
-from .solved import GROUPS, Solved, SolvedStrips, Wanted, reached
-from .strip import FINE_STEPS, KNOTS, Curve, strip_case
+from .settled import Quantity
+from .solved import GROUPS, Solved, SolvedStrips
+from .strip import KNOTS, Curve, strip_case
+from .strip_models import StripModels, WaysOut
 from .terms import strip_terms
 
-__all__ = ["BiasExtension", "solved_by"]
+__all__ = ["BiasExtension"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -55,19 +55,12 @@ Flags = npt.NDArray[np.bool_]
 #: Speeds of the crosshead that are told apart differ by this factor; of others strips are solved
 #: at the mean. Half as much again of a dashpot is not foretold where tows slip.
 PACE = 1.5
-#: Parameter of the baseline's dashpot.
-DASHPOT = "c1_N_s"
-#: Share by which a curve, a slip or a crimp may differ from those that a fit was solved with.
-SETTLED = 0.02
-#: Share of what strips are solved at below which an effect is none; share of a net of which
-#: corrections by a few per cent are not worth a solve.
-SLIGHT, LITTLE_NET = 1e-3, 0.05
+#: Share of a net of which corrections by a few per cent are not worth a solve.
+LITTLE_NET = 0.05
 #: Sets of strips of which it is kept how their crossings go.
 MOTIONS = 8
 #: Shares of even shear that fits may begin with.
 EVEN_STARTS = (0.0, 0.25, 0.5, 0.75, 1.0)
-#: Least work of moments, over that of the first curve, that strips slip at.
-LEAST_SIZE = 1e-6
 
 
 class BiasExtension(CrossheadTest):
@@ -98,8 +91,6 @@ class BiasExtension(CrossheadTest):
         first: Curve | None = None,
     ) -> None:
         self._first = first
-        self._corrections: dict[frozenset[Variant], Correction] = {}
-        self._settled: dict[frozenset[Variant], tuple[Solved, dict[str, Any]]] = {}
         self._like = like
         #: What a law that nothing was fitted of foretells; see frame_law.foretold.
         self.foretold: dict[str, float] = {}
@@ -275,8 +266,8 @@ class BiasExtension(CrossheadTest):
             "free_length": self._recorded.each(length - width),
             "pinned_angle": Varying(self._recorded_travels.of(first, "middle")),
         }
-        self._reached = reached(first, self._furthest)
-        self._reached /= float(self._reached @ first.curve.moments)
+        out = WaysOut(self._furthest, self._typical_rate, self._top, bool(self._back.any()))
+        self._models = StripModels(self._strips, first, out, self._moment_of)
 
     def _half_way(self, speed: Array) -> float:
         """A rate [rad/s] of the middle, half-way out at the runs' speeds [mm/s].
@@ -367,90 +358,14 @@ class BiasExtension(CrossheadTest):
         """
         if self._of_net(values).value < LITTLE_NET:
             return
-        key = solved_by(variants)
-        changes: dict[str, Any] = {}
-        for v in variants:
-            if isinstance(v, StripPullVariant) and v.changes is not None:
-                value = values[v.parameters[0].name]
-                changes |= v.changes(value) if value > SLIGHT * v.solved_at[0] else {}
-        curve = self._curve(variants, values, self._moments(variants, values).value)
-        if key in self._settled:
-            known, with_these = self._settled[key]
-            alike = changes.keys() == with_these.keys() and all(
-                abs(changes[n] - v) <= SETTLED * abs(v) for n, v in with_these.items()
-            )
-            if alike and known.apart(curve) < SETTLED:
-                return
-        place = (
-            f"where a fit ended with {', '.join(sorted(v.label for v in key)) or 'the baseline'}"
-        )
-        if place in self._strips.failed:
-            return
-        try:
-            exact = self._strips.solved(changes, curve, FINE_STEPS)
-        except SolveError as error:
-            self._strips.failed[place] = str(error)
-            return
-        self._settled[key] = exact, changes
-        self._mixture = self._mixed(variants, values)
-        self._corrections[key] = correction(exact, self._mixture, self._furthest)
-        # What slipped was by the force as it was foretold before.
-        self._slips.clear()
+        if self._models.settle(variants, values):
+            self._mixture = self._mixed(variants, values)
+            # What slipped was by the force as it was foretold before.
+            self._slips.clear()
 
     def _mixed(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[Part]:
-        """What is known of the strips of a model, solved now where that is not enough.
-
-        Slip at a force F0 with moments m is that at F0/s with moments m/s, in forces s times as
-        small: strips that slip are solved with moments of one size.
-        """
-        moments = self._moments(variants, values)
-        curve = self._curve(variants, values, moments.value)
-        base, parts = number(1.0), list[tuple[Wanted, Varying, Varying]]()
-        for v in variants:
-            if not isinstance(v, StripPullVariant) or v.changes is None:
-                continue
-            name = v.parameters[0].name
-            amplitude, size, mine = number(values[name], {name: 1.0}), number(1.0), curve
-            if v.per_force:
-                size = self._size(moments)
-                amplitude = amplitude * size
-                mine = self._curve(variants, values, moments.value, float(size.value))
-            at = float(amplitude.value)
-            for node, weight, slope in zip(*hermite_weights(v.solved_at, at), strict=True):
-                part = number(weight, {p: slope * d for p, d in amplitude.slopes.items()})
-                if node == 0.0:
-                    base += part
-                else:
-                    parts.append(((v.changes(node), mine), part, size))
-            base += number(-1.0)
-        parts.insert(0, (({}, curve), base, number(1.0)))
-        sets = self._strips.nearest([wanted for wanted, _, _ in parts])
-        return [
-            Part(solved, weight, size)
-            for solved, (_, weight, size) in zip(sets, parts, strict=True)
-        ]
-
-    def _curve(
-        self,
-        variants: Sequence[Variant],
-        values: Mapping[str, float],
-        moments: Array,
-        size: float = 1.0,
-    ) -> Curve:
-        """The curves of a model with some moments at KNOTS on its way out, over a size.
-
-        Of all but the baseline's dashpot, which strips are solved with as such.
-        """
-        dashpot = values[DASHPOT]
-        viscous, back = dashpot * self._typical_rate, None
-        if self._back.any():
-            moment = self._moment_of(_laws(variants), values)
-            back = (at_knots_back(moment, self._typical_rate, self._top) + viscous) / size
-        return Curve.through((moments - viscous) / size, dashpot / size, back)
-
-    def _moments(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Varying:
-        """Moments of a model on one way out at the speed of the runs, at KNOTS."""
-        return at_knots(self._moment_of(_laws(variants), values), self._typical_rate)
+        """What is known of the strips of a model."""
+        return self._models.parts(variants, values)
 
     def _moment_of(
         self, forms: Sequence[FrameVariant | None], values: Mapping[str, float]
@@ -464,14 +379,6 @@ class BiasExtension(CrossheadTest):
             return found
 
         return total
-
-    def _size(self, moments: Varying) -> Varying:
-        """Work of moments at KNOTS, over that of the first strips' curve on the same way."""
-        size = number(
-            float(self._reached @ moments.value),
-            {p: float(self._reached @ slope) for p, slope in moments.slopes.items()},
-        )
-        return size if size.value > LEAST_SIZE else number(LEAST_SIZE)
 
     # Model --------------------------------------------------------------------------------
 
@@ -575,8 +482,7 @@ class BiasExtension(CrossheadTest):
 
     def _correction(self, variants: Sequence[Variant], travel: Any, quantity: Quantity) -> Varying:
         """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
-        off = self._corrections.get(solved_by(variants))
-        return number(0.0) if off is None else off.at(quantity, travel["D"], self._phase)
+        return self._models.correction(variants, quantity, travel["D"], self._phase)
 
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
         """Mean shear angle of the middle zone at every reading [degrees], (n,)."""
@@ -590,19 +496,3 @@ class BiasExtension(CrossheadTest):
         strips, angles = self._strips, self._together.notes
         even = [] if self._even is None else [IN_WORDS]
         return [*strips.notes, *even, *foretold_in_words(self.foretold), *angles, *strips.left_out]
-
-
-def _laws(variants: Sequence[Variant]) -> list[FrameVariant | None]:
-    """The baseline's laws and those of forms."""
-    own = [v for v in variants if isinstance(v, FrameVariant) and v.laws is not None]
-    return [None, *own]
-
-
-def solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:
-    """Those that the strips' motion depends on."""
-    return frozenset(
-        v
-        for v in variants
-        if isinstance(v, FrameVariant)
-        and (v.laws is not None or getattr(v, "changes", None) is not None)
-    )
