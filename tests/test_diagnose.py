@@ -53,15 +53,21 @@ def report_of(folder):
     return json.loads((folder / "report.json").read_text(), parse_constant=refuse)
 
 
+#: Among all effects with a name, and no terms: the search for these takes minutes.
+NAMED = {"crossover_friction", "crossover_relaxation", "rate_hardening", "shear_locking"}
+NAMED |= {"tension_coupling", "crosshead_backlash", "load_drift"}
+
+
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory):
     """Folders of measurement and of report by name of a set."""
     made = {}
-    for name in SETS:
+    for name, (verdict, _) in SETS.items():
         folder = tmp_path_factory.mktemp("sets") / name
         RECIPES[name](folder)
         out = folder.parent / "report"
-        assert command("diagnose", folder, "--out", out, "--quiet") == 0
+        only = ("--effects", ",".join(sorted(NAMED))) if verdict == "unexplained" else ()
+        assert command("diagnose", folder, *only, "--out", out, "--quiet") == 0
         made[name] = folder, out
     return made
 
@@ -78,11 +84,7 @@ def test_the_report_keeps_the_contract(diagnosed, name):
     for effect in report["effects"]:
         assert effect["parameters"] and set(effect["std"]) == set(effect["parameters"])
         assert isinstance(effect["rivals"], list)
-    listed = "crossover_friction crossover_relaxation rate_hardening shear_locking"
-    listed += " tension_coupling crosshead_backlash load_drift"
-    names = {c["name"] for c in report["candidates"]}
-    # Where nothing listed will do, terms without a formula were tried as well.
-    assert names > set(listed.split()) if verdict == "unexplained" else names == set(listed.split())
+    assert {c["name"] for c in report["candidates"]} == NAMED
     for candidate in report["candidates"]:
         assert {"score", "p_value", "error_fit", "error_holdout"} < set(candidate)
         assert 0.0 <= candidate["p_value"] <= 1.0
@@ -136,13 +138,23 @@ def test_the_criterion_is_that_of_the_chosen(diagnosed):
     assert best["criterion"] == pytest.approx(own, abs=0.5)
 
 
+@pytest.mark.slow
+def test_terms_are_tried_where_no_name_will_do(tmp_path):
+    """To a vibration of less than two readings a cycle none is near."""
+    RECIPES["unlisted-vibration"](tmp_path / "set")
+    assert command("diagnose", tmp_path / "set", "--out", tmp_path / "out", "--quiet") == 0
+    report = report_of(tmp_path / "out")
+    assert report["verdict"] == "unexplained" and report["discovered"] == []
+    assert {c["name"] for c in report["candidates"]} > NAMED
+
+
 def test_the_unexplained_says_what_came_nearest(diagnosed, tmp_path):
-    """To wrinkles an even force; to a vibration of less than two readings a cycle nothing is near.
+    """To wrinkles an even force.
 
     What comes and goes within a few readings is noise beside the model, but not white.
     """
     report = report_of(diagnosed["unlisted-vibration"][1])
-    assert report["discovered"] == [] and report["whiteness"]["after"]["period"] < 1e-10
+    assert report["whiteness"]["after"]["period"] < 1e-10
     RECIPES["unlisted-wrinkles"](tmp_path / "set")
     only = ["--effects", "tension_coupling,load_drift", "--quiet"]
     assert command("diagnose", tmp_path / "set", "--out", tmp_path / "out", *only) == 0
@@ -241,7 +253,7 @@ def test_a_title_is_text_and_no_markup(tmp_path):
 
 
 def test_the_same_data_give_the_same_report(diagnosed, tmp_path):
-    folder, out = diagnosed["crossover_friction-dahl"]
+    folder, out = diagnosed["none-shear-declared"]
     assert command("diagnose", folder, "--out", tmp_path, "--quiet") == 0
     for name in ("report.json", "report.html"):
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes()

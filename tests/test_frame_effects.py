@@ -150,7 +150,7 @@ def alone():
     [
         ("crossover_friction",),
         ("viscous_moment_of_time", "reading_of_displacement"),
-        ("reading_of_force",),
+        pytest.param(("reading_of_force",), marks=pytest.mark.slow),
         ("travel_of_displacement",),
     ],
 )

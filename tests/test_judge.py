@@ -225,7 +225,11 @@ def test_where_held_out_runs_contradict_one_term_beside_slow_noise_two_are_tried
 
 
 @pytest.mark.parametrize(
-    ("truth", "found"), [("term", {"wave", "term"}), ("names", {"wave", "step", "bow"})]
+    ("truth", "found"),
+    [
+        ("term", {"wave", "term"}),
+        pytest.param("names", {"wave", "step", "bow"}, marks=pytest.mark.slow),
+    ],
 )
 def test_three_names_do_not_stand_for_one_of_them_and_a_term(truth, found):
     """A term is nearly two effects with names, and a third is there in truth."""

@@ -275,8 +275,15 @@ def test_three_effects_are_not_fitted_where_a_term_leaves_far_less_than_two(time
     assert further.finds_what_several_do_not(two) is gives_way
 
 
-@pytest.mark.parametrize("are_rivals", [True, False])
-@pytest.mark.parametrize(("size", "tried"), [(1.0, False), (0.04, True)])
+@pytest.mark.parametrize(
+    ("are_rivals", "size", "tried"),
+    [
+        (True, 1.0, False),
+        (False, 0.04, True),
+        pytest.param(False, 1.0, False, marks=pytest.mark.slow),
+        pytest.param(True, 0.04, True, marks=pytest.mark.slow),
+    ],
+)
 def test_a_term_is_looked_for_before_several_effects_with_names(
     monkeypatch, are_rivals, size, tried
 ):

@@ -365,7 +365,7 @@ def beam_model(section, law, cells=8, length=40.0, **options):
     )
 
 
-@pytest.mark.parametrize("d", [0.0, 1.0])
+@pytest.mark.parametrize("d", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_strip_in_pure_bending(d):
     """An end moment: the cells' strains are those at which the section's law is in balance."""
     cells = 8

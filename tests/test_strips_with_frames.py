@@ -169,6 +169,7 @@ def test_derivatives_of_a_law_with_a_dashpot_are_taken_over_differences():
     assert np.linalg.norm(off) > 0.05 * np.linalg.norm(slopes["c1_N_s"])
 
 
+@pytest.mark.slow
 def test_fits_with_the_locking_of_frames_end_where_nothing_moves():
     """From two starts at the same place, at which every way off makes the residual larger."""
     measured, _ = strips({"tow.stiffness.stretch_N_mm": 25.0}, sizes=(1.0, 1.2))
