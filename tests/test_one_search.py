@@ -42,6 +42,22 @@ def search(test):
     return found
 
 
+@pytest.mark.parametrize(("share", "tried"), [(0.0, False), (0.09, True)])
+def test_an_effect_is_tried_as_what_specimens_visibly_differ_by(share, tried):
+    """One that goes by what is different from run to run may be all of that; as here."""
+    lots = np.repeat(np.linspace(-share, share, RUNS), EACH)
+    columns = {"lot": lambda t: 2.0 * t * lots, "hump": lambda t: t * (1.0 - t)}
+    test = made(columns, columns["lot"], [linear_effect(name) for name in columns])
+    models = Models(test, test.effects)
+    signatures = models.signed(test.effects)
+    own = one_search.by_itself(signatures[test.effects[0]])
+    alike = models.with_alike_specimens(own)
+    assert bool(alike) is tried
+    for one in alike:
+        assert one.values["lot"] == pytest.approx(1.0, abs=0.1)
+        assert np.abs(one.deviations["b"]).max() < 0.01
+
+
 def test_forms_are_looked_at_again_when_noise_is_known():
     """Beside slow noise of 1 what two short forms lack is nothing; beside what is left it is."""
 

@@ -25,8 +25,8 @@ __all__ = ["REFINED_WITHIN", "Models", "nearest_forms", "nothing_left", "simples
 
 #: Scatter of specimens, as a share, that first fits allow for.
 FIRST_SCATTER = 0.1
-#: ... and where they are taken to be all but alike.
-ALIKE = 0.01
+#: ... and where they are taken to be all but alike; from which scatter on that is tried, too.
+ALIKE, VISIBLE = 0.01, 0.05
 #: Forms whose own variances are looked for, beside the best ones of each set of effects.
 MOST_NEAR, OF_A_SET = 16, 2
 #: Models whose parameters are fitted again with their own variances ...
@@ -67,6 +67,8 @@ class Models:
         self._refined: set[Model] = set()
         self.start = {p.name: p.starts[0] for p in experiment.baseline}
         self.variances = self._first_variances()
+        #: Of specimens, as a share, as it was found with the noise.
+        self._largest_scatter = 0.0
         fitted = self.baseline(self.start)
         self.judge.leave_out(fitted)
         self.base = self.baseline(fitted.values)
@@ -105,6 +107,7 @@ class Models:
     def take_noise_from(self, fitted: Fit) -> None:
         """Take noise and scatter from a model with a smooth line for what it misses."""
         found = self.judge.components(fitted, smooth=True).variances
+        self._largest_scatter = max(found.scatter.values(), default=0.0)
         scatter = {g: max(tau, FIRST_SCATTER) for g, tau in found.scatter.items()}
         self.variances = Variances(found.noise, scatter)
 
@@ -166,10 +169,10 @@ class Models:
     def with_alike_specimens(self, combinations: Sequence[Combination]) -> list[Fit]:
         """Forms of an effect with specimens that hardly differ.
 
-        What the baseline takes for their differences, where these are more than usual, may be all
-        that there is of an effect; a fit that allows for them as they were does not get there.
+        What the baseline takes for their differences, where these are visible, may be all that
+        there is of an effect; a fit that allows for them as they were does not get there.
         """
-        if max(self.variances.scatter.values(), default=0.0) <= FIRST_SCATTER:
+        if self._largest_scatter <= VISIBLE:
             return []
         allowed = self.variances
         self.variances = Variances(allowed.noise, dict.fromkeys(allowed.scatter, ALIKE))
