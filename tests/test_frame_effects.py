@@ -128,11 +128,12 @@ def test_a_run_not_fitted_has_a_zero_of_its_own_where_the_fitted_one_hardly_has(
 
 @pytest.mark.slow
 def test_no_candidate_fits_worse_than_the_baseline():
-    # Fits in which far readings count less need not come near them.
+    # Fits in which far readings count less need not come near them. Each is with noise of its own,
+    # which weighs readings otherwise: in the last digits.
     found = diagnosed(added=lambda run, t: 0.5 * np.sin(t / 3.0))
     before = found.baseline.rms(found.baseline.used)
     for candidate in found.candidates:
-        assert candidate.fit.rms(found.baseline.used) <= before * (1.0 + 1e-9)
+        assert candidate.fit.rms(found.baseline.used) <= before * (1.0 + 1e-5)
 
 
 @pytest.fixture(scope="module")
