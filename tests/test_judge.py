@@ -259,7 +259,7 @@ def test_three_names_do_not_stand_for_one_of_them_and_a_term(truth, found):
     assert {e.name for e in diagnose_test(test).effects} == found
 
 
-def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None):
+def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None, essential=False):
     """A line with a bend in it, or a round one: an effect is the bend, a term the round one.
 
     Args:
@@ -268,6 +268,7 @@ def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None):
         more: of how much of the round one, less the bend, the effect has a number of its own.
         bound: of that number; the truth of a round one is 1.
         imitated: see Experiment.
+        essential: whether the effect is named by that number.
     """
     t = np.tile(np.linspace(0.0, 1.0, 60), 4)
     run = np.repeat(np.arange(4), 60)
@@ -276,7 +277,7 @@ def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None):
     columns["bend_more"] = sigmas * SIGMA * more * (columns["round_size"] - columns["bend_size"])
     clean = 1.0 + 2.0 * t + sigmas * SIGMA * columns[f"{truth}_size"]
     observed = clean + SIGMA * np.random.default_rng(2).normal(size=len(t))
-    roundness = (Parameter("bend_more", (0.5,), 0.0, bound),) if more else ()
+    roundness = (Parameter("bend_more", (0.5,), 0.0, bound, essential=essential),) if more else ()
 
     def effect(name, acts_on="", also=()):
         return linear_effect(
@@ -326,6 +327,14 @@ def test_a_form_at_the_edge_may_stand_for_another_law(bound, rivals):
     at_the_edge = [name for name in said.final.at_bound if name == "bend_more"]
     assert [e.name for e in said.effects] == ["bend"] and bool(at_the_edge) is bool(rivals)
     assert said.rivals["bend"] == rivals
+
+
+@pytest.mark.parametrize(("bound", "found", "rival"), [(0.7, "round", "bend"), (5.0, "bend", "")])
+def test_what_lacks_what_its_name_says_is_a_rival_of_the_other(bound, found, rival):
+    """Where the number that it is named by ends at a bound, and another law does about as well."""
+    said = diagnose_test(curved("round", 60.0, more=1.0, bound=bound, essential=True))
+    assert [e.name for e in said.effects] == [found]
+    assert said.rivals[found] == [rival] * bool(rival)
 
 
 @pytest.mark.parametrize(

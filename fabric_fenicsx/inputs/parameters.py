@@ -26,6 +26,8 @@ class Parameter:
             "moment", the largest of them in the fitted baseline.
         jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
             for on both sides.
+        essential: whether its effect is what its name says only where this one is inside its
+            bounds: relaxation in no time is a dashpot's.
         of_model: whether it says which model of the rig is nearer, and nothing of the fabric: the
             same for all specimens.
         run, specimen: the run, or the specimen, counted from 0, that it alone belongs to.
@@ -39,6 +41,7 @@ class Parameter:
     meaning: str = ""
     share_of: str = ""
     jumps: bool = False
+    essential: bool = False
     of_model: bool = False
     run: int | None = None
     specimen: int | None = None

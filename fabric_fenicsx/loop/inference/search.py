@@ -124,6 +124,9 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
         other = single.run()
     search.judge.compared = True
     final = search.judge.weighed(chosen.fit, chosen.effects)
+    if _lacks_what_its_name_says(chosen.fit):
+        # Then the other one is as good, and says what there is.
+        least = -CRITERIA.decisive
     gain = final.criterion - other.criterion_after
     if _at_the_edge(other.final) or any(effect.of_two for effect in other.effects):
         # It may stand for another law as well as they, or is no simpler than two of them.
@@ -203,6 +206,12 @@ def _at_the_edge(model: Fit) -> bool:
     """
     free = {p.name for v in model.variants for p in v.parameters if not p.amplitude}
     return bool(free & set(model.at_bound))
+
+
+def _lacks_what_its_name_says(model: Fit) -> bool:
+    """Whether what its effects are named by is at a bound; see Parameter.essential."""
+    named_by = {p.name for v in model.variants for p in v.parameters if p.essential}
+    return bool(named_by & set(model.at_bound))
 
 
 def _beside(further: Diagnosis, found: Diagnosis) -> Diagnosis:

@@ -30,7 +30,15 @@ SHORTEST = Parameter(
 
 def _branch(index: str, starts: tuple[float, ...]) -> dict[str, Any]:
     name = f"relaxation_time{index}_s"
-    tau = Parameter(name, starts, 1e-3, 10.0, meaning="its relaxation time", share_of="duration")
+    tau = Parameter(
+        name,
+        starts,
+        1e-3,
+        10.0,
+        meaning="its relaxation time",
+        share_of="duration",
+        essential=True,
+    )
     return {"stiffness": replace(STIFFNESS, name=f"k_maxwell{index}_N"), "relaxation_time": tau}
 
 
