@@ -215,7 +215,7 @@ class RecordedRig:
         values: Mapping[str, float],
         left: Array,
         readings: Readings,
-        runs: Sequence[int] | Integers,
+        runs: Integers,
     ) -> tuple[Varying, list[tuple[Flags, Array]]]:
         """What the load cell adds; in a run that is not fitted, what fits best to what is left.
 

@@ -28,7 +28,7 @@ from ...inference.experiment import NO_DEVIATIONS, Deviations
 from .mixture import Part, number
 from .model import BiasExtension
 from .solved import Solved, Wanted, Way
-from .strip_models import pulled, solved_by
+from .strip_models import changes_of, pulled, solved_by
 
 __all__ = ["CentredBiasExtension"]
 
@@ -158,7 +158,7 @@ class CentredBiasExtension(BiasExtension):
 
     def _wanted(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Wanted:
         """What a strip is to be solved with."""
-        return _changes(variants, values), self._models.curve(variants, values)
+        return changes_of(variants, values), self._models.curve(variants, values)
 
     def _about_to(
         self, variants: Sequence[Variant], values: Mapping[str, float], solved: Solved
@@ -186,13 +186,3 @@ def _steps(variants: Sequence[Variant], values: Mapping[str, float]) -> dict[str
     """Changes of amplitudes that derivatives in them are taken over."""
     parameters = [v.parameters[0] for v in pulled(variants)]
     return {p.name: STEP * max(values[p.name], OF_START * p.starts[0]) for p in parameters}
-
-
-def _changes(variants: Sequence[Variant], values: Mapping[str, float]) -> dict[str, Any]:
-    """Keys of a case with some amplitudes; see StripPullVariant."""
-    found: dict[str, Any] = {}
-    for v in pulled(variants):
-        value = values[v.parameters[0].name]
-        if value > 0.0 and v.changes is not None:
-            found |= v.changes(value)
-    return found

@@ -27,7 +27,7 @@ from .settled import Correction, Quantity, correction
 from .solved import Solved, SolvedStrips, Wanted, reached
 from .strip import FINE_STEPS, Curve
 
-__all__ = ["StripModels", "pulled", "solved_by"]
+__all__ = ["StripModels", "WaysOut", "changes_of", "pulled", "solved_by"]
 
 Array = npt.NDArray[np.float64]
 
@@ -117,11 +117,7 @@ class StripModels:
             Whether what is foretold of such models has changed.
         """
         key = solved_by(variants)
-        changes: dict[str, Any] = {}
-        for v in pulled(variants):
-            value = values[v.parameters[0].name]
-            if v.changes is not None and value > SLIGHT * v.solved_at[0]:
-                changes |= v.changes(value)
+        changes = changes_of(variants, values, SLIGHT)
         curve = self.curve(variants, values)
         if key in self._settled:
             known, with_these = self._settled[key]
@@ -192,6 +188,24 @@ def _laws(variants: Sequence[Variant]) -> list[FrameVariant | None]:
 def pulled(variants: Sequence[Variant]) -> list[StripPullVariant]:
     """Those that strips are solved with, beside the laws of the crossings."""
     return [v for v in variants if isinstance(v, StripPullVariant) and v.changes is not None]
+
+
+def changes_of(
+    variants: Sequence[Variant], values: Mapping[str, float], slight: float = 0.0
+) -> dict[str, Any]:
+    """Keys of a case with some amplitudes; see StripPullVariant.
+
+    Args:
+        variants: of a model.
+        values: of its parameters.
+        slight: share of what strips are solved at up to which an effect is none.
+    """
+    found: dict[str, Any] = {}
+    for v in pulled(variants):
+        value = values[v.parameters[0].name]
+        if v.changes is not None and value > slight * v.solved_at[0]:
+            found |= v.changes(value)
+    return found
 
 
 def solved_by(variants: Sequence[Variant]) -> frozenset[Variant]:
