@@ -20,7 +20,7 @@ from fabric_fenicsx.loop.kinds.bias_extension.frame_law import (
 )
 from fabric_fenicsx.loop.kinds.bias_extension.mixture import Travels
 from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
-from fabric_fenicsx.loop.kinds.bias_extension.phases import backward
+from fabric_fenicsx.loop.kinds.bias_extension.phases import backward, phases_of, since_stop
 from fabric_fenicsx.loop.kinds.bias_extension.quantities import read_together
 from fabric_fenicsx.loop.kinds.bias_extension.solved import Way
 from fabric_fenicsx.loop.kinds.bias_extension.strip import (
@@ -142,8 +142,22 @@ def test_only_strips_whose_holds_are_read_are_solved_standing_still():
         "force_N": np.zeros(len(D) + 2),
     }
     strips = BiasExtension([measured(short, long, replace(held, columns=columns))])
-    *_, stops, _ = strips._strips._strips
+    *_, stops, holds, _ = strips._strips._strips
     assert stops.tolist() == [False, False, True]
+    # From where it stopped, and not from the first reading that it stands still at.
+    assert holds == pytest.approx([0.0, 0.0, 10.0])
+
+
+def test_a_stop_between_two_readings_was_when_the_way_was_gone():
+    time = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])[:, None]
+    D = np.array([0.0, 2.0, 4.0, 5.0, 5.0, 4.0])[:, None]
+    speed = np.array([2.0, 2.0, 2.0, 0.0, 0.0, -1.0])[:, None]
+    phases = phases_of(D, speed, backward(D, speed))
+    since = since_stop(D, time, speed, phases, np.array([5.0]))
+    assert np.isnan(since[[0, 1, 2, 5]]).all()
+    assert since[3:5, 0] == pytest.approx([0.5, 1.5])
+    # One that stopped before its end is not held where it got furthest.
+    assert np.isnan(since_stop(D, time, speed, phases, np.array([8.0]))).all()
 
 
 def test_a_dashpot_costs_its_work():

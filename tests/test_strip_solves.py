@@ -119,8 +119,39 @@ def test_a_strip_that_was_stopped_goes_on_as_if_it_had_not_been():
     along = PchipInterpolator(path.travel, path.gamma).derivative()(path.travel[-2])
     sheared = path.gamma[-2] > 0.5 * path.gamma[-2].max()
     assert held.lever[-2][sheared].mean() > 1.02 * along[sheared].mean()
-    # Without a limit that it comes to there is nothing to be had.
-    assert solved_strip(case(), slow, True).rest is None
+    # Without dashpots and slip nothing changes where it stops.
+    assert solved_strip(case(), SOFT, True).rest is None
+
+
+@pytest.mark.parametrize("changes", [{}, SLIPPING], ids=["pinned", "slipping"])
+def test_a_strip_that_is_held_comes_to_rest_as_the_rig_s_does(changes):
+    """And goes back from there: dashpots spread the angles otherwise than springs do."""
+    way, hold, speed, dashpot = 14.0, 2.0, 5.0, 0.05
+    wanted = case(changes, 2.0 * WIDTH, way, WIDTH, back=True, hold=hold, steps=40)
+    keys = {"travel_mm": way, "rate_mm_min": 60.0 * speed}
+    step = {"first_step_s": way / speed / 40, "largest_step_s": way / speed / 40}
+    solver = wanted.solver.model_copy(update=step)
+    curve = replace(SOFT, dashpot=dashpot)
+    path = solved_strip(wanted.model_copy(update={**keys, "solver": solver}), curve, True)
+    law = {"k1_N_mm": 0.02, "k3_N_mm": 0.2, "dashpot_N_s_mm": dashpot}
+    law |= {name.split(".")[1]: value for name, value in changes.items()}
+    times = np.array([0.0, way, way + speed * hold, 2.0 * way + speed * hold]) / speed
+    exact = pulled(2.0 * WIDTH, times, [0.0, way, way, 0.0], law=law, steps=400, readings=401)
+    time, force, angle = (exact[n] for n in ("time_s", "force_N", "shear_angle_deg"))
+    held = time > times[1] + 0.04
+    held &= time <= times[2]
+    since = time[held] - times[1]
+    near = path.rest.force[-1] + path.hold.at("force", since)
+    fall = np.interp(times[1], time, force) - force[held][-1]
+    assert fall > 0.1 * force.max()
+    assert near == pytest.approx(force[held], abs=0.08 * fall)
+    assert near[since > 0.3] == pytest.approx(force[held][since > 0.3], abs=0.03 * fall)
+    near = np.degrees(path.rest.middle[-1] + path.hold.at("middle", since))
+    # As near as steps of the way out are, of which there are few.
+    assert near == pytest.approx(angle[held], abs=0.25)
+    back = time > times[2] + 0.1
+    near = PchipInterpolator(path.back.travel, path.back.force)(exact["displacement_mm"][back])
+    assert near == pytest.approx(force[back], abs=0.01 * force.max())
 
 
 def test_a_way_back_has_a_curve_of_its_own():

@@ -35,6 +35,8 @@ Array = npt.NDArray[np.float64]
 RATES, LENGTHS = (1.0, 10.0), (1.0, 1.25)
 #: Steps of a way, if none fails, and points of the crosshead's motion.
 STEPS, POINTS = 40, 1001
+#: Shares of such a step at which a strip is looked at after each corner, where forces change fast.
+SOON = (0.01, 0.03, 0.1, 0.3)
 
 
 class _OfTheNet(BiasExtension):
@@ -159,7 +161,10 @@ def _read(
         laws=tuple(partial(type(law).of_case, law.keys()) for law in laws),
     )
     model = build(case, session, _true_travel(case, forms, values, place))
-    time, force, angle = pulled(model, case, (*turns(case), duration(case)))
+    corners = [0.0, *turns(case)]
+    soon = [corner + share * way / STEPS for corner in corners for share in SOON]
+    ends = sorted({*corners[1:], *(t for t in soon if t < duration(case)), duration(case)})
+    time, force, angle = pulled(model, case, ends)
     at = run.columns["time_s"]
     return {"force_N": np.interp(at, time, force), ANGLE: np.interp(at, time, np.degrees(angle))}
 

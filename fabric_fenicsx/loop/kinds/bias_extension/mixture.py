@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -15,7 +16,7 @@ from ...kept import Kept
 from .phases import Parted, Phase
 from .solved import GROUPS, Name, Solved, polynomial
 
-__all__ = ["Part", "Travels", "number", "of_groups", "of_ways"]
+__all__ = ["Holds", "Part", "Travels", "number", "of_groups", "of_ways"]
 
 Array = npt.NDArray[np.float64]
 
@@ -104,6 +105,41 @@ class Travels:
                 pieces[:, points, k] = own.reshape(4, len(points), -1)
                 s[points, k, 0] = on
         return pieces, s
+
+
+class Holds:
+    """Where crossheads stand still with strips pulled furthest, and what these still exert there.
+
+    Args:
+        since: time since they stopped [s], NaN elsewhere, (n_points, n_runs).
+    """
+
+    def __init__(self, since: Array) -> None:
+        self._since = since
+        self._known: Kept[Array] = Kept(KEPT)
+
+    def of(self, parts: Sequence[Part], name: Literal["force", "middle"]) -> Varying:
+        """What is left of the way to rest, (n_points, n_runs).
+
+        Args:
+            parts: of the model.
+            name: force [N], which goes with the size of the forces, or angle of the middle [rad].
+        """
+        total = number(0.0)
+        for part in parts:
+            if any(way.hold for way in part.solved.ways):
+                asked = part.solved, name
+                left = Varying(self._known(asked, (), partial(self._left, *asked)))
+                total += (part.weight * part.size if name == "force" else part.weight) * left
+        return total
+
+    def _left(self, solved: Solved, name: Literal["force", "middle"]) -> Array:
+        found = np.zeros(self._since.shape)
+        for r, way in enumerate(solved.ways):
+            if way.hold is not None:
+                found[:, r] = way.hold.at(name, self._since[:, r])
+        found.flags.writeable = False
+        return found
 
 
 def of_groups(

@@ -38,8 +38,8 @@ from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
 from .even_shear import EVEN, IN_WORDS, EvenZones, of_both
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
 from .going import columns_of, gone
-from .mixture import Part, Travels, number, of_ways
-from .phases import GONE_BACK, Phase, backward, moving, parted, phases_of, speed_out
+from .mixture import Holds, Part, Travels, number, of_ways
+from .phases import GONE_BACK, Phase, backward, moving, parted, phases_of, since_stop, speed_out
 from .quantities import coarser, first_curve, read_together, strip_of
 from .settled import Quantity
 from .solved import GROUPS, Solved, SolvedStrips
@@ -246,7 +246,11 @@ class BiasExtension(CrossheadTest):
         self._typical_rate = self._half_way(speed[self._parent])
         like = self._like
         paths = {} if like is None else like._strips.paths
-        strips = self._furthest, self._speed, back, stops, spaced
+        since, longest = since_stop(D, time, rate, self._phase, self._furthest), np.zeros(len(runs))
+        np.maximum.at(longest, of, np.nan_to_num(since[points, of]))
+        holds = np.array([longest[own].max() for own in same])
+        self._holds = Holds(since)
+        strips = self._furthest, self._speed, back, stops, holds, spaced
         self._strips: SolvedStrips = SolvedStrips(runs, *strips, paths)
         suggested = self._first
         if suggested is None:
@@ -454,6 +458,7 @@ class BiasExtension(CrossheadTest):
         whole = super()._force(travel, variants, values, by)
         D, travels = travel["D"], self._travels(travel["D"])
         rest = of_ways(self._mixture, travels, D.slopes, "rest")
+        rest += self._holds.of(self._mixture, "force")
         rest += self._correction(variants, travel, "force")
         return whole + rest * self._of_net(values)
 
@@ -469,6 +474,7 @@ class BiasExtension(CrossheadTest):
         """Mean shear angle of the middle zone [rad], (n_points, n_runs)."""
         D, travels = travel["D"], self._travels(travel["D"])
         middle = of_ways(self._mixture, travels, D.slopes, "middle")
+        middle += self._holds.of(self._mixture, "middle")
         middle += self._correction(variants, travel, "middle")
         if self._even is None:
             return middle
@@ -482,7 +488,8 @@ class BiasExtension(CrossheadTest):
 
     def _correction(self, variants: Sequence[Variant], travel: Any, quantity: Quantity) -> Varying:
         """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
-        return self._models.correction(variants, quantity, travel["D"], self._phase)
+        at = travel["D"], self._phase, self._holds
+        return self._models.correction(variants, quantity, *at)
 
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:
         """Mean shear angle of the middle zone at every reading [degrees], (n,)."""

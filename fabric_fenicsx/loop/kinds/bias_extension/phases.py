@@ -18,6 +18,7 @@ __all__ = [
     "moving",
     "parted",
     "phases_of",
+    "since_stop",
     "speed_out",
 ]
 
@@ -85,3 +86,27 @@ def phases_of(D: Array, speed: Array, back: Flags) -> Phases:
     stopped = (speed == 0.0) & ~back & (D > GONE_BACK * D.max(axis=0))
     found = np.where(stopped, Phase.STOPPED, np.where(back, Phase.BACK, Phase.OUT))
     return np.asarray(found, dtype=np.int8)
+
+
+def since_stop(D: Array, time: Array, speed: Array, phases: Phases, furthest: Array) -> Array:
+    """Time since crossheads stopped where their strips get furthest [s], (n_points, n_runs).
+
+    NaN elsewhere. Where they stopped between two points they went on at their speed until then.
+
+    Args:
+        D: travels of the crossheads [mm], (n_points, n_runs).
+        time: at the points [s], (n_points, n_runs).
+        speed: of the crossheads [mm/s], (n_points, n_runs).
+        phases: what they do, (n_points, n_runs).
+        furthest: that their strips get [mm], (n_runs,).
+    """
+    found = np.full(D.shape, np.nan)
+    held = (phases == Phase.STOPPED) & (D >= (1.0 - GONE_BACK) * furthest)
+    for r in np.flatnonzero(held.any(axis=0)):
+        first = int(np.argmax(held[:, r]))
+        before = max(first - 1, 0)
+        pace = speed[before, r]
+        on = (D[first, r] - D[before, r]) / pace if pace > 0.0 else 0.0
+        stopped = min(time[before, r] + on, time[first, r])
+        found[held[:, r], r] = (time[:, r] - stopped)[held[:, r]]
+    return found

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ...expressions.marching import Varying
-from .mixture import Part, Travels, of_groups, of_ways
+from .mixture import Holds, Part, Travels, number, of_groups, of_ways
 from .phases import SIGN, Phase, Phases, parted
 from .solved import Solved
 
@@ -32,13 +32,16 @@ class Correction:
     Attributes:
         furthest: travel that each strip was solved up to [mm], (n_runs,).
         force, middle: by Phase, of each run, of the travel.
+        exact, foretold: the strips that were solved, and what was known of them otherwise.
     """
 
     furthest: Array
     force: tuple[list[PchipInterpolator], ...]
     middle: tuple[list[PchipInterpolator], ...]
+    exact: Solved
+    foretold: Sequence[Part]
 
-    def at(self, quantity: Quantity, D: Varying, phase: Phases) -> Varying:
+    def at(self, quantity: Quantity, D: Varying, phase: Phases, holds: Holds) -> Varying:
         """At travels [mm], (n_points, n_runs)."""
         at = np.clip(D.value, 0.0, self.furthest)
 
@@ -51,7 +54,10 @@ class Correction:
             return total
 
         along = found(1) if D.slopes else 0.0
-        return Varying(found(0), {p: along * slope for p, slope in D.slopes.items()})
+        held = holds.of([Part(self.exact, number(1.0))], quantity).value
+        known = holds.of(self.foretold, quantity).value
+        slopes = {p: along * slope for p, slope in D.slopes.items()}
+        return Varying(found(0) + held - known, slopes)
 
 
 def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Correction:
@@ -85,4 +91,4 @@ def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Corr
             off[name].append(
                 [PchipInterpolator(*line) for line in zip(D.T, missing.T, strict=True)]
             )
-    return Correction(furthest, tuple(off["force"]), tuple(off["middle"]))
+    return Correction(furthest, tuple(off["force"]), tuple(off["middle"]), exact, foretold)

@@ -24,7 +24,7 @@ from ...copies import put_off_in_copies
 from ...measurement.schema import Measurement, Run
 from ...workers import each_of
 from .phases import SIGN, Phase, Phases
-from .standing import AtRest
+from .standing import AtRest, Hold
 from .strip import KNOTS, STEPS, Curve, StripPath, solved_strip, strip_case
 
 __all__ = [
@@ -109,6 +109,7 @@ class Way:
         speed: dD/dt [mm/s], negative on the way back.
         back: the way back; None where it is taken to be the way out.
         stopped: where the crosshead stands still; None where that is taken to be the way out.
+        hold: how it comes to rest where it got furthest; None where it is at once.
     """
 
     area: Array
@@ -118,6 +119,7 @@ class Way:
     speed: float
     back: Way | None = None
     stopped: Stopped | None = None
+    hold: Hold | None = None
 
     def at(self, name: Name, D: Array, phase: Phases, order: int = 0) -> Array:
         """Angles, rest, middle, or the lever dγ/dD of moments, at travels [mm], (n, ...).
@@ -221,6 +223,7 @@ class SolvedStrips:
         speed: at which [mm/s], (n_runs,).
         back: whether it is let back as well, (n_runs,).
         stops: whether it is wanted as it stands still, too, (n_runs,).
+        holds: how long it is held where it got furthest [s], (n_runs,).
         coarser: by how much further apart than they are its tows are taken to be, (n_runs,).
         paths: of strips that were solved before, by what they were solved with; is added to.
 
@@ -239,11 +242,12 @@ class SolvedStrips:
         speed: Array,
         back: Flags,
         stops: Flags,
+        holds: Array,
         coarser: Array,
         paths: dict[Task, StripPath],
     ) -> None:
         self._runs, self._furthest = list(runs), furthest
-        self._strips = furthest, speed, back, stops, coarser
+        self._strips = furthest, speed, back, stops, holds, coarser
         self._groups: dict[int, npt.NDArray[np.int64]] = {}
         self._known: dict[str, list[Solved]] = {}
         self.paths = paths
@@ -320,9 +324,9 @@ class SolvedStrips:
         places: list[Task] = []
         for run, changes, curve in wanted:
             measurement, own = self._runs[run]
-            travel, pace, back, stops, coarser = (of[run] for of in self._strips)
+            travel, pace, back, stops, hold, coarser = (of[run] for of in self._strips)
             way = float(travel), float(pace), changes, steps, bool(back)
-            case = strip_case(measurement, own, *way, float(coarser))
+            case = strip_case(measurement, own, *way, float(coarser), float(hold))
             places.append((case.model_dump_json(), curve, bool(stops)))
             if places[-1] not in self.paths:
                 put_off_in_copies()
@@ -451,6 +455,7 @@ def _way(path: StripPath, group: npt.NDArray[np.int64], curve: Curve) -> Way:
         path.speed,
         None if path.back is None else _way(path.back, group, curve.back or curve),
         None if path.rest is None else _stopped(path, path.rest, group, curve),
+        path.hold,
     )
 
 

@@ -2,8 +2,9 @@
 
 While a strip is pulled dashpots act, and tows slip at crossings whose force is at the limit. Where
 the crosshead stops dashpots let go, all forces fall, those of crossings below the limit: what has
-slipped stays so, and friction no longer pulls. Angles settle in a balance without rates. About it
-the strip answers as one whose crossings hold: a little more of a moment m_c at a crossing changes
+slipped stays so, and friction no longer pulls. Angles settle in a balance without rates, also where
+nothing slips: a dashpot spreads them otherwise than springs do. About that balance the strip
+answers as one whose crossings hold: a little more of a moment m_c at a crossing changes
 the force that keeps the crosshead where it is by
 
     δF = A_c dγ_c/dD δm_c
@@ -15,6 +16,7 @@ is symmetric). On the way that the strip was pulled some of each bit is slip, an
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +27,7 @@ from ....rigs.crosshead import crosshead
 from ....solving.model import Model
 from ....solving.newton import Newton
 
-__all__ = ["AtRest", "Standing"]
+__all__ = ["AtRest", "Hold", "Standing"]
 
 Array = npt.NDArray[np.float64]
 
@@ -54,11 +56,33 @@ class AtRest:
     lever: Array
 
 
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """A strip on its way to rest where it was pulled furthest.
+
+    Attributes:
+        time: since the crosshead stopped [s], the first of them 0, (n,).
+        force: of the crosshead [N] over that at rest, (n,).
+        middle: mean angle between the tows' axes in the middle zone [rad] over that at rest, (n,).
+    """
+
+    time: Array
+    force: Array
+    middle: Array
+
+    def at(self, name: Literal["force", "middle"], since: Array) -> Array:
+        """At times since then [s]; nothing where these are not numbers, or none."""
+        scale = self.time[1]
+        along = np.log1p(np.maximum(since, 0.0) / scale)
+        found = np.interp(along, np.log1p(self.time / scale), getattr(self, name))
+        return np.where(since >= 0.0, found, 0.0)
+
+
 class Standing:
     """Stops a strip wherever it is, and lets it go on as if it had not been.
 
     Args:
-        model: of the strip, whose tows slip, alone on its rank.
+        model: of the strip, alone on its rank.
         case: of it.
     """
 
@@ -104,15 +128,16 @@ class Standing:
     def _lever(self, newton: Newton, time: float) -> Array:
         """Change of the angles by the travel about the increment in the fields."""
         model, crossings = self._model, self._model.crossings
-        assert crossings is not None and crossings.slip_limit is not None
+        assert crossings is not None
         limit = crossings.slip_limit
-        slips_at = float(limit.value)
+        slips_at = NEVER if limit is None else float(limit.value)
         whole = 60.0 * self._case.travel_mm / self._case.rate_mm_min
         # The crosshead is on its way, so that it comes from one side where it goes no further.
         other = time + SHARE * whole * (1.0 if time < 0.5 * whole else -1.0)
         change = crosshead(self._case, other) - crosshead(self._case, time)
         place = newton.x.array.copy()
-        limit.value = NEVER
+        if limit is not None:
+            limit.value = NEVER
         try:
             b = model.disc.vector()
             b.array[model.fixed] = model.targets(time, other)
@@ -123,7 +148,8 @@ class Standing:
                 model.system.set_increment(newton.x)
                 angles.append(model.shear_angles())
         finally:
-            limit.value = slips_at
+            if limit is not None:
+                limit.value = slips_at
         return np.asarray((angles[0] - angles[1]) / (2.0 * change))
 
     def found(self) -> AtRest:

@@ -35,7 +35,7 @@ from ....solving.snapshot import Snapshot
 from ....solving.stepping import Step, Stepper
 from ...measurement.case import measured_case, tow_of
 from ...measurement.schema import FILE, Measurement, Run
-from .standing import AtRest, Standing
+from .standing import AtRest, Hold, Standing
 
 __all__ = ["KNOTS", "Curve", "StripPath", "pulled", "solved_strip", "strip_case"]
 
@@ -46,6 +46,8 @@ Flags = npt.NDArray[np.bool_]
 KNOTS = np.array([0.0, 3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 38.0, 44.0, 50.0, 56.0, 62.0, 70.0])
 #: Steps of a way out, if none fails: where others are foretold of it, and where it is itself meant.
 STEPS, FINE_STEPS = 18, 40
+#: Times of a hold that a strip is looked at, as shares of it.
+HELD = np.geomspace(1e-3, 1.0, 12)
 #: Least slope of a curve over the largest moment: nothing else holds crossings that do nothing.
 LEAST_SLOPE = 1e-3
 #: Keys of a crossing that stands for so much fabric.
@@ -128,6 +130,7 @@ class StripPath:
         speed: dD/dt [mm/s], negative on the way back.
         back: its way back from there; None where it was not solved.
         rest: where it stands still at each of these travels; None where that was not solved.
+        hold: how it gets there at the last of them; None likewise.
     """
 
     travel: Array
@@ -138,6 +141,7 @@ class StripPath:
     speed: float
     back: StripPath | None = None
     rest: AtRest | None = None
+    hold: Hold | None = None
 
 
 def strip_case(
@@ -149,6 +153,7 @@ def strip_case(
     steps: int = STEPS,
     back: bool = False,
     coarser: float = 1.0,
+    hold: float = 0.0,
 ) -> BiasExtensionCase:
     """The case of a run's way out, its crossings without a moment of their own.
 
@@ -161,6 +166,7 @@ def strip_case(
         steps: of the way, if none fails.
         back: whether it is let back to where it began.
         coarser: by how much further apart than they are its tows are taken to be.
+        hold: how long it is held where it was pulled furthest [s].
 
     Raises:
         InputError: there can be no such strip.
@@ -182,7 +188,7 @@ def strip_case(
         "weft_spacing_mm": spacing,
         "travel_mm": travel,
         "rate_mm_min": 60.0 * rate,
-        "hold_s": 0.0,
+        "hold_s": hold,
         "unload": back,
         "tow": tow,
         "crossover": {"k1_N_mm": 0.0, "k3_N_mm": 0.0, "dashpot_N_s_mm": 0.0},
@@ -202,6 +208,7 @@ def pulled(
     corners: Iterable[float],
     seen: Callable[[Snapshot], None] = lambda snapshot: None,
     kept: Callable[[Newton, float], None] = lambda newton, time: None,
+    longest: Callable[[float], float] | None = None,
 ) -> tuple[Array, Array, Array]:
     """Pull a strip from its rest on.
 
@@ -212,6 +219,7 @@ def pulled(
             one before it has been reached.
         seen: given each step's snapshot.
         kept: given the solver and the time where that has become the state to go on from.
+        longest: step [s] from a time on until the next corner; by default the case's.
 
     Returns:
         Times [s], forces of the crosshead [N] and mean angles between the tows' axes in the middle
@@ -239,6 +247,8 @@ def pulled(
         keep=lambda step: kept(newton, step.time),
     )
     for corner in corners:
+        if longest is not None:
+            stepper.control.largest = longest(stepper.state.time)
         stepper.run(corner)
         stepper.predictor.forget()
     time, force, angle = np.array(rows).T
@@ -372,33 +382,51 @@ class _Strip:
         angles = [np.zeros(len(places))]
         out, end = 60.0 * case.travel_mm / case.rate_mm_min, duration(case)
 
+        held = case.hold_s * HELD if case.hold_s > 0.0 else np.zeros(0)
+
         def corners() -> Iterator[float]:
             yield out
+            yield from out + held
             if case.unload:
                 self._take(curve.back or curve)
                 yield end
 
-        # Where nothing slips all goes back to what the way out has, but for the dashpots.
+        # Without dashpots and slip all is as it is on the way out.
         assert model.crossings is not None
-        standing = (
-            Standing(model, case) if stops and model.crossings.slip_limit is not None else None
-        )
+        lets_go = model.crossings.slip_limit is not None or curve.dashpot > 0.0
+        standing = Standing(model, case) if stops and lets_go else None
 
         def kept(newton: Newton, time: float) -> None:
             if standing is not None and time <= out * (1.0 + 1e-9):
                 standing.stop(newton, time)
 
+        def longest(time: float) -> float:
+            """Of a step: while the crosshead stands still nothing turns in between."""
+            stands = out * (1.0 - 1e-9) < time < (out + case.hold_s) * (1.0 - 1e-9)
+            return float("inf") if stands else case.solver.largest_step_s
+
         time, force, middle = pulled(
-            model, case, corners(), lambda snapshot: angles.append(snapshot.director_turn), kept
+            model,
+            case,
+            corners(),
+            lambda snapshot: angles.append(snapshot.director_turn),
+            kept,
+            longest,
         )
         travel = np.array([crosshead(case, t) for t in time])
         gamma, turn = np.array(angles), int(np.argmin(np.abs(time - out))) + 1
-
+        last = int(np.argmin(np.abs(time - out - case.hold_s))) + 1
         speed = case.rate_mm_min / 60.0
 
         def path(rows: slice, *more: Any) -> StripPath:
             return StripPath(travel[rows], force[rows], gamma[rows], middle[rows], area, *more)
 
         # Of the turn itself the way back has no force: the moments have just changed.
-        back = path(slice(None, turn - 1, -1), -speed) if case.unload else None
-        return path(slice(turn), speed, back, None if standing is None else standing.found())
+        back = path(slice(None, last - 1, -1), -speed) if case.unload else None
+        if standing is None:
+            return path(slice(turn), speed, back)
+        rest, rows, hold = standing.found(), slice(turn - 1, last), None
+        if case.hold_s > 0.0:
+            over = force[rows] - rest.force[-1], middle[rows] - rest.middle[-1]
+            hold = Hold(time[rows] - time[turn - 1], *over)
+        return path(slice(turn), speed, back, rest, hold)

@@ -21,7 +21,7 @@ from ..drape.shear_field import hermite_weights
 from ..picture_frame.variant import FrameVariant
 from .curves import Moment, at_knots, at_knots_back
 from .effects import StripPullVariant
-from .mixture import Part, number
+from .mixture import Holds, Part, number
 from .phases import Phases
 from .settled import Correction, Quantity, correction
 from .solved import Solved, SolvedStrips, Wanted, reached
@@ -141,11 +141,16 @@ class StripModels:
         return True
 
     def correction(
-        self, variants: Sequence[Variant], quantity: Quantity, D: Varying, phase: Phases
+        self,
+        variants: Sequence[Variant],
+        quantity: Quantity,
+        D: Varying,
+        phase: Phases,
+        holds: Holds,
     ) -> Varying:
         """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
         off = self._corrections.get(solved_by(variants))
-        return number(0.0) if off is None else off.at(quantity, D, phase)
+        return number(0.0) if off is None else off.at(quantity, D, phase, holds)
 
     def curve(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Curve:
         """The curves of a model; of all but the baseline's dashpot, which is solved as such."""
