@@ -19,7 +19,7 @@ from fabric_fenicsx.loop.kinds.bias_extension.frame_law import (
     locking_variant,
 )
 from fabric_fenicsx.loop.kinds.bias_extension.mixture import Travels
-from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
+from fabric_fenicsx.loop.kinds.bias_extension.model import OFTEN, SELDOM, BiasExtension
 from fabric_fenicsx.loop.kinds.bias_extension.phases import backward, phases_of, since_stop
 from fabric_fenicsx.loop.kinds.bias_extension.quantities import read_together
 from fabric_fenicsx.loop.kinds.bias_extension.solved import Way
@@ -143,9 +143,16 @@ def test_only_strips_whose_holds_are_read_are_solved_standing_still():
     }
     strips = BiasExtension([measured(short, long, replace(held, columns=columns))])
     *_, stops, holds, _ = strips._strips._strips
-    assert stops.tolist() == [False, False, True]
+    assert stops.tolist() == [0, 0, SELDOM]
     # From where it stopped, and not from the first reading that it stands still at.
     assert holds == pytest.approx([0.0, 0.0, 10.0])
+    # One that stands still on its way is wanted so all along.
+    D = np.concatenate([D[:8], np.full(2, D[7]), D[8:]])
+    time = np.arange(len(D)) * (time[1] - time[0])
+    columns = {"time_s": time, "displacement_mm": D, "force_N": np.zeros(len(D))}
+    strips = BiasExtension([measured(short, replace(held, columns=columns))])
+    *_, stops, holds, _ = strips._strips._strips
+    assert stops.tolist() == [0, OFTEN] and not holds.any()
 
 
 def test_a_stop_between_two_readings_was_when_the_way_was_gone():

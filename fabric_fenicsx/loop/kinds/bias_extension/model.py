@@ -57,6 +57,8 @@ Flags = npt.NDArray[np.bool_]
 PACE = 1.5
 #: Share of a net of which corrections by a few per cent are not worth a solve.
 LITTLE_NET = 0.05
+#: How often a strip is stopped that stands still on its way, and one that does where it ends.
+OFTEN, SELDOM = 1000, 6
 #: Sets of strips of which it is kept how their crossings go.
 MOTIONS = 8
 #: Shares of even shear that fits may begin with.
@@ -217,9 +219,11 @@ class BiasExtension(CrossheadTest):
         self._back &= back
         self._phase = phases_of(D, rate, self._back)
         # Of the points that are read: a record that is shorter than others rests at its last one.
-        stopped, (points, of) = np.zeros(len(runs), dtype=bool), self._recorded.place
-        np.logical_or.at(stopped, of, self._phase[points, of] == Phase.STOPPED)
-        stops = np.array([stopped[own].any() for own in same])
+        stopped, (points, of) = np.zeros(len(runs), dtype=np.int64), self._recorded.place
+        on_its_way = D < (1.0 - GONE_BACK) * self._furthest
+        wanted = np.where(self._phase == Phase.STOPPED, np.where(on_its_way, OFTEN, SELDOM), 0)
+        np.maximum.at(stopped, of, wanted[points, of])
+        stops = np.array([stopped[own].max() for own in same])
         # An angle is read of a strip whose force is, mostly at the same places: its crossings go
         # as they do in that run.
         moved = np.stack([self._points[name].value for name in ("time", "D", "D_rate")])

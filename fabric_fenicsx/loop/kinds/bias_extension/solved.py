@@ -56,8 +56,8 @@ TRAVELS, ANGLES = 20, 480
 Wanted = tuple[Mapping[str, Any], Curve]
 """Changed keys of the case, by their dotted names, and a curve."""
 
-Task = tuple[str, Curve, bool]
-"""A whole case, a curve, and whether the strip is wanted as it stands still."""
+Task = tuple[str, Curve, int]
+"""A whole case, a curve, and how often the strip is stopped."""
 
 
 def polynomial(coefficients: Array, s: Array, order: int) -> Array:
@@ -222,7 +222,7 @@ class SolvedStrips:
         furthest: travel that each strip is solved up to [mm], (n_runs,).
         speed: at which [mm/s], (n_runs,).
         back: whether it is let back as well, (n_runs,).
-        stops: whether it is wanted as it stands still, too, (n_runs,).
+        stops: how often it is stopped on its way out; see solved_strip, (n_runs,).
         holds: how long it is held where it got furthest [s], (n_runs,).
         coarser: by how much further apart than they are its tows are taken to be, (n_runs,).
         paths: of strips that were solved before, by what they were solved with; is added to.
@@ -241,7 +241,7 @@ class SolvedStrips:
         furthest: Array,
         speed: Array,
         back: Flags,
-        stops: Flags,
+        stops: npt.NDArray[np.int64],
         holds: Array,
         coarser: Array,
         paths: dict[Task, StripPath],
@@ -320,17 +320,17 @@ class SolvedStrips:
         self, wanted: Sequence[tuple[int, Mapping[str, Any], Curve]], steps: int
     ) -> list[StripPath | Exception]:
         """Of each run with its changes and curve what is known, or is solved now."""
-        tasks: dict[Task, tuple[Any, Curve, bool]] = {}
+        tasks: dict[Task, tuple[Any, Curve, int]] = {}
         places: list[Task] = []
         for run, changes, curve in wanted:
             measurement, own = self._runs[run]
             travel, pace, back, stops, hold, coarser = (of[run] for of in self._strips)
             way = float(travel), float(pace), changes, steps, bool(back)
             case = strip_case(measurement, own, *way, float(coarser), float(hold))
-            places.append((case.model_dump_json(), curve, bool(stops)))
+            places.append((case.model_dump_json(), curve, int(stops)))
             if places[-1] not in self.paths:
                 put_off_in_copies()
-                tasks.setdefault(places[-1], (case, curve, bool(stops)))
+                tasks.setdefault(places[-1], (case, curve, int(stops)))
         order = sorted(tasks, key=lambda key: -tasks[key][0].length_mm * tasks[key][0].width_mm)
         stopped: dict[Task, Exception] = {}
         results = each_of(solved_strip, [tasks[key] for key in order])

@@ -15,11 +15,13 @@ is symmetric). On the way that the strip was pulled some of each bit is slip, an
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
 
 from ....errors import SolveError
 from ....rigs.bias_extension import BiasExtensionCase, clamps, middle_zone
@@ -84,12 +86,25 @@ class Standing:
     Args:
         model: of the strip, alone on its rank.
         case: of it.
+        planned: times after which it is stopped [s], rising.
     """
 
-    def __init__(self, model: Model, case: BiasExtensionCase) -> None:
-        self._model, self._case = model, case
+    def __init__(self, model: Model, case: BiasExtensionCase, planned: Sequence[float]) -> None:
+        self._model, self._case, self._planned = model, case, planned
         self._upper, self._middle = clamps(model.net, case)[1], middle_zone(model.net, case)[0]
         self._rows: list[tuple[float, Array, float, Array]] = []
+        self._times = [0.0]
+
+    def passed(self, newton: Newton, time: float) -> None:
+        """Stop the accepted state at a time [s] if it is the first one after a planned stop.
+
+        Raises:
+            SolveError: there is no such balance.
+        """
+        due = [planned for planned in self._planned if planned <= time * (1.0 + 1e-9)]
+        if due:
+            self._planned = self._planned[len(due) :]
+            self.stop(newton, time)
 
     def stop(self, newton: Newton, time: float) -> None:
         """Let the accepted state at a time [s] come to rest, note it, and put back what it was.
@@ -104,6 +119,7 @@ class Standing:
         middle = float(snapshot.shear_angle[self._middle].mean())
         lever = self._lever(newton, time)
         self._rows.append((force, snapshot.director_turn, middle, lever))
+        self._times.append(time)
         newton.x.set(0.0)
         model.system.set_increment(newton.x)
 
@@ -152,13 +168,29 @@ class Standing:
                 limit.value = slips_at
         return np.asarray((angles[0] - angles[1]) / (2.0 * change))
 
-    def found(self) -> AtRest:
-        """All that was noted, behind the strip as it was made, which answers as in the first."""
-        force, gamma, middle, lever = (np.array(v) for v in zip(*self._rows, strict=True))
-        nothing = np.zeros_like(gamma[:1])
+    def found(self, time: Array, force: Array, gamma: Array, middle: Array) -> AtRest:
+        """All that was noted, and in between what the strip differs by from itself as it is pulled.
+
+        Args:
+            time: of its steps, the first of them 0 [s], (n,).
+            force: on its way [N], (n,).
+            gamma: there [rad], (n, n_crossings).
+            middle: there [rad], (n,).
+        """
+        at = np.searchsorted(time, np.array(self._times) * (1.0 - 1e-9))
+        forces, angles, middles, levers = (
+            np.array(v) for v in zip(self._rows[0], *self._rows, strict=True)
+        )
+
+        def whole(values: Array, noted: Array) -> Array:
+            differ = noted - values[at]
+            # It begins as it was made.
+            differ[0] = 0.0
+            return np.asarray(values + PchipInterpolator(time[at], differ)(time))
+
         return AtRest(
-            np.append(0.0, force),
-            np.concatenate([nothing, gamma]),
-            np.append(0.0, middle),
-            np.concatenate([lever[:1], lever]),
+            whole(force, forces),
+            whole(gamma, angles),
+            whole(middle, middles),
+            np.asarray(PchipInterpolator(time[at], levers)(time)),
         )

@@ -255,13 +255,14 @@ def pulled(
     return time, force, angle
 
 
-def solved_strip(case: BiasExtensionCase, curve: Curve, stops: bool = False) -> StripPath:
+def solved_strip(case: BiasExtensionCase, curve: Curve, stops: int = 0) -> StripPath:
     """Pull a strip on this rank alone, and let it back where the case says so.
 
     Args:
         case: of the strip.
         curve: of its crossings.
-        stops: whether it is wanted as it stands still on its way out, too.
+        stops: how often it is stopped on its way out, to know it as it stands still: once after
+            each step at most, and always where it ends.
 
     Raises:
         InputError: there is no such strip.
@@ -373,8 +374,8 @@ class _Strip:
         for table in self._tables:
             table.exchange(curve, self._area)
 
-    def pulled(self, case: BiasExtensionCase, curve: Curve, stops: bool) -> StripPath:
-        """Pull it, stop it after each step if so wanted, let it back with the curve of that way."""
+    def pulled(self, case: BiasExtensionCase, curve: Curve, stops: int) -> StripPath:
+        """Pull it, stop it so often as it goes, let it back with the curve of that way."""
         model = self._model
         places, spacings = model.net.points[model.net.crossings[:, 0]], case.spacings
         area = case.strip.shares(places, spacings) * spacings[0] * spacings[1]
@@ -391,14 +392,15 @@ class _Strip:
                 self._take(curve.back or curve)
                 yield end
 
+        planned = (out * np.arange(1, stops + 1) / max(stops, 1)).tolist()
         # Without dashpots and slip all is as it is on the way out.
         assert model.crossings is not None
         lets_go = model.crossings.slip_limit is not None or curve.dashpot > 0.0
-        standing = Standing(model, case) if stops and lets_go else None
+        standing = Standing(model, case, planned) if stops and lets_go else None
 
         def kept(newton: Newton, time: float) -> None:
             if standing is not None and time <= out * (1.0 + 1e-9):
-                standing.stop(newton, time)
+                standing.passed(newton, time)
 
         def longest(time: float) -> float:
             """Of a step: while the crosshead stands still nothing turns in between."""
@@ -425,8 +427,9 @@ class _Strip:
         back = path(slice(None, last - 1, -1), -speed) if case.unload else None
         if standing is None:
             return path(slice(turn), speed, back)
-        rest, rows, hold = standing.found(), slice(turn - 1, last), None
+        way, rows, hold = slice(turn), slice(turn - 1, last), None
+        rest = standing.found(time[way], force[way], gamma[way], middle[way])
         if case.hold_s > 0.0:
             over = force[rows] - rest.force[-1], middle[rows] - rest.middle[-1]
             hold = Hold(time[rows] - time[turn - 1], *over)
-        return path(slice(turn), speed, back, rest, hold)
+        return path(way, speed, back, rest, hold)
