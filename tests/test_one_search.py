@@ -429,13 +429,32 @@ def test_models_that_may_be_the_best_are_refined_together_and_others_left(monkey
     assert weighed[0].effects[0].name == "c0" and len(t) == EACH
     together = []
     each = models.each_refined
-    monkeypatch.setattr(models, "each_refined", lambda own: together.append(own) or each(own))
+    monkeypatch.setattr(
+        models, "each_refined", lambda own, best: together.append(own) or each(own, best)
+    )
     best = models.best_refined(weighed)
     assert best[0].effects[0].name == "c0"
     (first,) = together
     forms = [m.fit.variants for m in first]
     assert len(set(forms)) == len(forms) <= 3
     assert all(m.criterion < weighed[0].criterion + 60.0 for m in first)
+
+
+@pytest.mark.parametrize(("ahead", "refined"), [(61.0, 1), (57.0, 3)])
+def test_of_models_that_are_all_far_behind_the_first_alone_is_refined(monkeypatch, ahead, refined):
+    """It may be better than it looks; the next ones are as far behind."""
+    shapes = {f"c{k}": lambda t, k=k: np.sin((3 + k) * t) for k in range(3)}
+    test = made(shapes, lambda t: 0.5 * np.sin(3.0 * t), [linear_effect(n) for n in shapes])
+    test.in_copies = False
+    models = Models(test, test.effects)
+    fits = models.fitted(
+        [((v, own[0]),) for e in test.effects for v, own in models.signed([e])[e].items()], starts=1
+    )
+    alike = [replace(m, criterion=float(k)) for k, m in enumerate(models.weighed(fits))]
+    asked = []
+    monkeypatch.setattr(models, "refined", lambda one, best: asked.append(best) or one)
+    models.best_refined(alike, -ahead)
+    assert asked == [-ahead] * refined
 
 
 @pytest.mark.parametrize(("behind", "settled"), [(59.0, 1), (61.0, 0)])

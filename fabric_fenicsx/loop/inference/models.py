@@ -283,11 +283,11 @@ class Models:
                 break
         return self._as_attained(model)
 
-    def each_refined(self, models: Sequence[Model]) -> list[Model]:
+    def each_refined(self, models: Sequence[Model], best: float = float("inf")) -> list[Model]:
         """Each of some models; see refined."""
         more = [one for model in models for one in (model, *model.effects)]
         known = self._known_to_all([model.fit for model in models], more)
-        return each_by_itself(self.experiment, self.refined, models, known)
+        return each_by_itself(self.experiment, lambda one: self.refined(one, best), models, known)
 
     def of_one_each(self, fits: Sequence[tuple[Effect, Fit]], best: float) -> list[Model]:
         """Models of one effect each, from their fits; see refined."""
@@ -344,25 +344,32 @@ class Models:
         attained = model.estimate.likelihood + self.judge.cost(model.fit, model.effects) + missed
         return replace(model, criterion=attained)
 
-    def best_refined(self, models: list[Model]) -> list[Model]:
+    def best_refined(self, models: list[Model], beside: float = float("inf")) -> list[Model]:
         """Models, the best first; the best of each set of effects was fitted again.
 
         A model is only compared as the best when its parameters go with its own variances.
+
+        Args:
+            models: to compare.
+            beside: criterion of what else there is: of those far behind it only the first are
+                fitted again.
         """
         refined: list[Model] = []
         ahead: dict[Model, Model] = {}
         rest = sorted(models, key=lambda m: m.criterion)
         while rest:
             best = min((m.criterion for m in refined), default=float("inf"))
+            nearest = min(best, beside)
             if len(refined) >= REFINED and rest[0].criterion >= best:
                 break
-            if rest[0].criterion > best + REFINED_WITHIN or len(refined) >= 2 * REFINED:
+            far = bool(refined) and rest[0].criterion > nearest + REFINED_WITHIN
+            if far or len(refined) >= 2 * REFINED:
                 break
             model = rest[0]
             if model not in self._refined:
                 if model not in ahead:
                     first = self._first_ones(rest, best)
-                    ahead |= zip(first, self.each_refined(first), strict=True)
+                    ahead |= zip(first, self.each_refined(first, beside), strict=True)
                 model = ahead[model]
                 self._refined.add(model)
             rest = rest[1:]
@@ -385,14 +392,16 @@ class Models:
                 found.append(model)
         return found
 
-    def ranked(self, found: Sequence[Fit]) -> list[Model]:
+    def ranked(self, found: Sequence[Fit], beside: float = float("inf")) -> list[Model]:
         """Fits as models with their own noise and scatter, the best first; see weighed.
+
+        Beside others of a criterion; see best_refined.
 
         What the baseline has wrong looks like slow noise, and hides in what forms of an effect
         differ. With noise as the best of them leaves it they are looked at, and the nearest ones
         fitted, again.
         """
-        level = self.best_refined(self.weighed(found))
+        level = self.best_refined(self.weighed(found), beside)
         if not level:
             return level
         before, rows = self.variances, level[0].fit.used
@@ -405,7 +414,7 @@ class Models:
                 return level
             nearest = [(one, self.variances) for one in self._nearest_now(found, rows)]
             again = [one for one in self._each_again(nearest, CRITERIA.far) if not cancelling(one)]
-            return self.best_refined([*level, *self.weighed(again)])
+            return self.best_refined([*level, *self.weighed(again)], beside)
         finally:
             self.variances = before
 

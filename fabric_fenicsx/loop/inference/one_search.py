@@ -303,11 +303,12 @@ class Search:
         levels.append(self.models.best_refined(singles))
         if self._screened_first and not self._settled(_nearest(levels), levels[0][0]):
             ranked = screen.most_promising(len(tried) + CRITERIA.glimpsed)
-            later = self._after_a_glimpse(screen, self._signatures, ranked[len(tried) :])
+            rest, nearest = ranked[len(tried) :], _nearest(levels).criterion
+            later = self._after_a_glimpse(screen, self._signatures, rest, nearest)
             levels[1] = simplest_first([*levels[1], *later])
         best = _nearest(levels)
         if self._of_two and (not self._settled(best, levels[0][0]) or self.judge.uneven(best.fit)):
-            of_two = self._over_two_variables(candidates)
+            of_two = self._over_two_variables(candidates, best.criterion)
             levels[1] = simplest_first([*levels[1], *of_two])
         for candidate in candidates:
             candidate.fit = _best_of(candidate.effect, levels)
@@ -328,22 +329,34 @@ class Search:
         differ = self.experiment.each_its_own_way and bool(model.effects and model.fit.deviations)
         return not differ or self.judge.enough(model, baseline)
 
-    def _over_two_variables(self, candidates: list[Candidate]) -> list[Model]:
-        """Models of the most promising terms over two variables, which join the candidates."""
+    def _over_two_variables(self, candidates: list[Candidate], nearest: float) -> list[Model]:
+        """Models of the most promising terms over two variables, which join the candidates.
+
+        Args:
+            candidates: so far.
+            nearest: criterion of the best model so far.
+        """
         signs = self.models.signed(self._of_two)
         screen = self._screen(signs)
-        found = self._after_a_glimpse(screen, signs, screen.most_promising(CRITERIA.glimpsed))
+        promising = screen.most_promising(CRITERIA.glimpsed)
+        found = self._after_a_glimpse(screen, signs, promising, nearest)
         tried = list(dict.fromkeys(model.effects[0] for model in found))
         scores = screen.scores(tried)
         candidates += [Candidate(e, *score) for e, score in zip(tried, scores, strict=True)]
         return found
 
     def _after_a_glimpse(
-        self, screen: Screen, signs: Signatures, ranked: Sequence[Effect]
+        self, screen: Screen, signs: Signatures, ranked: Sequence[Effect], nearest: float
     ) -> list[Model]:
         """Models of those effects of which one form, fitted, leaves least; in all their forms.
 
         To first order an effect that changes much is misjudged: a few steps say more.
+
+        Args:
+            screen: of the effects.
+            signs: theirs, by effect.
+            ranked: effects, the most promising first.
+            nearest: criterion of the best model so far.
         """
         left: dict[Effect, float] = {}
         for effect in ranked:
@@ -352,7 +365,7 @@ class Search:
         found: list[Fit] = []
         for effect in sorted(left, key=lambda one: left[one])[: CRITERIA.products]:
             found += self.models.fitted(by_itself(signs[effect]), starts=1)
-        return self.models.ranked(found)
+        return self.models.ranked(found, nearest)
 
     def _screened(self) -> Screen:
         """All effects to first order about the baseline, with the variances as they are now."""
