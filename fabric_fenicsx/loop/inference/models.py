@@ -368,7 +368,7 @@ class Models:
             model = rest[0]
             if model not in self._refined:
                 if model not in ahead:
-                    first = self._first_ones(rest, best)
+                    first = self._first_ones(rest, nearest)
                     ahead |= zip(first, self.each_refined(first, beside), strict=True)
                 model = ahead[model]
                 self._refined.add(model)

@@ -219,11 +219,15 @@ class BiasExtension(CrossheadTest):
         self._back &= back
         self._phase = phases_of(D, rate, self._back)
         # Of the points that are read: a record that is shorter than others rests at its last one.
-        stopped, (points, of) = np.zeros(len(runs), dtype=np.int64), self._recorded.place
-        on_its_way = D < (1.0 - GONE_BACK) * self._furthest
-        wanted = np.where(self._phase == Phase.STOPPED, np.where(on_its_way, OFTEN, SELDOM), 0)
+        points, of = self._recorded.place
+        since = since_stop(D, time, rate, self._phase, self._furthest)
+        often = np.where(np.isnan(since), OFTEN, SELDOM)
+        wanted = np.where(self._phase == Phase.STOPPED, often, 0)
+        stopped, longest = np.zeros(len(runs), dtype=np.int64), np.zeros(len(runs))
         np.maximum.at(stopped, of, wanted[points, of])
-        stops = np.array([stopped[own].max() for own in same])
+        np.maximum.at(longest, of, np.nan_to_num(since[points, of]))
+        stops, holds = (np.array([most[own].max() for own in same]) for most in (stopped, longest))
+        self._holds = Holds(since)
         # An angle is read of a strip whose force is, mostly at the same places: its crossings go
         # as they do in that run.
         moved = np.stack([self._points[name].value for name in ("time", "D", "D_rate")])
@@ -250,10 +254,6 @@ class BiasExtension(CrossheadTest):
         self._typical_rate = self._half_way(speed[self._parent])
         like = self._like
         paths = {} if like is None else like._strips.paths
-        since, longest = since_stop(D, time, rate, self._phase, self._furthest), np.zeros(len(runs))
-        np.maximum.at(longest, of, np.nan_to_num(since[points, of]))
-        holds = np.array([longest[own].max() for own in same])
-        self._holds = Holds(since)
         strips = self._furthest, self._speed, back, stops, holds, spaced
         self._strips: SolvedStrips = SolvedStrips(runs, *strips, paths)
         suggested = self._first

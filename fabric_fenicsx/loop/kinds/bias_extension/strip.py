@@ -383,19 +383,19 @@ class _Strip:
         angles = [np.zeros(len(places))]
         out, end = 60.0 * case.travel_mm / case.rate_mm_min, duration(case)
 
-        held = case.hold_s * HELD if case.hold_s > 0.0 else np.zeros(0)
+        # Without dashpots and slip all is as it is on the way out.
+        assert model.crossings is not None
+        lets_go = model.crossings.slip_limit is not None or curve.dashpot > 0.0
 
         def corners() -> Iterator[float]:
             yield out
-            yield from out + held
+            if case.hold_s > 0.0:
+                yield from out + case.hold_s * (HELD if lets_go else HELD[-1:])
             if case.unload:
                 self._take(curve.back or curve)
                 yield end
 
         planned = (out * np.arange(1, stops + 1) / max(stops, 1)).tolist()
-        # Without dashpots and slip all is as it is on the way out.
-        assert model.crossings is not None
-        lets_go = model.crossings.slip_limit is not None or curve.dashpot > 0.0
         standing = Standing(model, case, planned) if stops and lets_go else None
 
         def kept(newton: Newton, time: float) -> None:
