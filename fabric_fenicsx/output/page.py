@@ -14,6 +14,8 @@ import matplotlib as mpl
 import numpy as np
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 __all__ = ["data_uri", "finite", "inline", "number", "rendered", "save_figure"]
@@ -50,17 +52,24 @@ def number(value: float | None, digits: int = 3) -> Markup:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG, laid out once for this file and for `inline`."""
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    figure.savefig(path, dpi=DOTS)
+    """Write a figure as PNG, laid out once for this file and for `inline`.
+
+    By its canvas: ``savefig`` draws everything once more, to know how large it is.
+    """
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    figure.set_dpi(DOTS)
+    FigureCanvasAgg(figure).print_png(path)
 
 
 def inline(figure: Figure, name: str) -> str:
     """A figure as a data URI: as an image of its own, its ids clash with no other's."""
     buffer = io.BytesIO()
+    figure.set_dpi(INLINE_DOTS)
     with mpl.rc_context({"svg.hashsalt": name}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None}, dpi=INLINE_DOTS)
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
     return data_uri(buffer.getvalue(), "svg+xml")
 
 

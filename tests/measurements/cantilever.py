@@ -78,7 +78,7 @@ def _curvature(strip: Strip) -> Callable[[np.ndarray, float], np.ndarray]:
 
 
 def _from_the_tip(strip: Strip, tip_slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Moments and slopes, shape (2, STEPS + 1, n), for n slopes of the free end (RK4)."""
+    """Moments and slopes, shape (STEPS + 1, n) each, for n slopes of the free end (RK4)."""
     curvature, step = _curvature(strip), strip.length / STEPS
 
     def outboard(s: float) -> float:
@@ -86,20 +86,22 @@ def _from_the_tip(strip: Strip, tip_slope: np.ndarray) -> tuple[np.ndarray, np.n
         thickness = 1 + strip.taper * (strip.length + s) / (2 * strip.length)
         return strip.tip_weight + strip.weight * span * thickness
 
-    def slope(s: float, y: np.ndarray) -> np.ndarray:
-        return np.stack([outboard(s) * np.cos(y[1]), strip.curvature + curvature(y[0], s)])
+    def slope(s: float, moment: np.ndarray, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return outboard(s) * np.cos(phi), strip.curvature + curvature(moment, s)
 
-    y = np.stack([np.zeros_like(tip_slope), tip_slope])
-    states = [y]
+    M, phi = np.zeros_like(tip_slope), tip_slope
+    moments, slopes = [M], [phi]
     for i in range(STEPS):
         s = strip.length - i * step
-        k1 = slope(s, y)
-        k2 = slope(s - step / 2, y - step / 2 * k1)
-        k3 = slope(s - step / 2, y - step / 2 * k2)
-        k4 = slope(s - step, y - step * k3)
-        y = y - step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        states.append(y)
-    return np.array(states[::-1]).transpose(1, 0, 2)
+        a1, b1 = slope(s, M, phi)
+        a2, b2 = slope(s - step / 2, M - step / 2 * a1, phi - step / 2 * b1)
+        a3, b3 = slope(s - step / 2, M - step / 2 * a2, phi - step / 2 * b2)
+        a4, b4 = slope(s - step, M - step * a3, phi - step * b3)
+        M = M - step / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        phi = phi - step / 6 * (b1 + 2 * b2 + 2 * b3 + b4)
+        moments.append(M)
+        slopes.append(phi)
+    return np.array(moments[::-1]), np.array(slopes[::-1])
 
 
 def hang(strip: Strip) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -35,8 +35,9 @@ Array = npt.NDArray[np.float64]
 RATES, LENGTHS = (1.0, 10.0), (1.0, 1.25)
 #: Steps of a way, if none fails, and points of the crosshead's motion.
 STEPS, POINTS = 40, 1001
-#: Shares of such a step at which a strip is looked at after each corner, where forces change fast.
-SOON = (0.01, 0.03, 0.1, 0.3)
+#: Shares of such a step at which a strip is looked at after each corner, where forces change fast
+#: and are straight between these.
+SOON = (*np.geomspace(0.002, 0.1, 8), *np.arange(0.15, 1.0, 0.05), *np.arange(1.0, 4.0, 0.2))
 
 
 class _OfTheNet(BiasExtension):
@@ -162,8 +163,13 @@ def _read(
     )
     model = build(case, session, _true_travel(case, forms, values, place))
     corners = [0.0, *turns(case)]
-    soon = [corner + share * way / STEPS for corner in corners for share in SOON]
-    ends = sorted({*corners[1:], *(t for t in soon if t < duration(case)), duration(case)})
+    soon = [
+        corner + share * way / STEPS
+        for corner, until in zip(corners, [*corners[1:], duration(case)], strict=True)
+        for share in SOON
+        if corner + share * way / STEPS < until
+    ]
+    ends = sorted({*corners[1:], *soon, duration(case)})
     time, force, angle = pulled(model, case, ends)
     at = run.columns["time_s"]
     return {"force_N": np.interp(at, time, force), ANGLE: np.interp(at, time, np.degrees(angle))}

@@ -14,13 +14,14 @@ from ...expressions.marching import Varying
 from .mixture import Holds, Part, Travels, number, of_groups, of_ways
 from .phases import SIGN, Phase, Phases, parted
 from .solved import Solved
+from .strip import SOON
 
 __all__ = ["Correction", "Quantity", "correction"]
 
 Array = npt.NDArray[np.float64]
 
-#: Points of each way at which they are compared.
-ALONG = 60
+#: Shares of the whole travel at which they are compared, more of them where a way begins.
+ALONG = np.unique([*np.linspace(0.0, 1.0, 60), *SOON, *(1.0 - SOON)])
 
 Quantity = Literal["force", "middle"]
 
@@ -68,7 +69,7 @@ def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Corr
         foretold: what forces and angles follow from otherwise.
         furthest: travel that each strip was solved up to [mm], (n_runs,).
     """
-    D, curve = np.linspace(0.0, furthest, ALONG), exact.curve
+    D, curve = ALONG[:, None] * furthest, exact.curve
     area = np.stack([way.area for way in exact.ways])
     speed = np.array([way.speed for way in exact.ways])[:, None]
     off: dict[str, list[list[PchipInterpolator]]] = {"force": [], "middle": []}

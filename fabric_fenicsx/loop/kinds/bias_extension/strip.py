@@ -37,7 +37,7 @@ from ...measurement.case import measured_case, tow_of
 from ...measurement.schema import FILE, Measurement, Run
 from .standing import AtRest, Hold, Standing
 
-__all__ = ["KNOTS", "Curve", "StripPath", "pulled", "solved_strip", "strip_case"]
+__all__ = ["KNOTS", "SOON", "Curve", "StripPath", "pulled", "solved_strip", "strip_case"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -47,7 +47,10 @@ KNOTS = np.array([0.0, 3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 38.0, 44.0, 50.0, 56.0,
 #: Steps of a way out, if none fails: where others are foretold of it, and where it is itself meant.
 STEPS, FINE_STEPS = 18, 40
 #: Times of a hold that a strip is looked at, as shares of it.
-HELD = np.geomspace(1e-3, 1.0, 12)
+HELD = np.geomspace(1e-3, 1.0, 18)
+#: Shares of a way that a strip with dashpots or slip is looked at when it has begun: what is in
+#: series with them gives way first.
+SOON = np.array([5e-4, 1.5e-3, 4e-3, 8e-3, 1.6e-2])
 #: Least slope of a curve over the largest moment: nothing else holds crossings that do nothing.
 LEAST_SLOPE = 1e-3
 #: Keys of a crossing that stands for so much fabric.
@@ -387,15 +390,18 @@ class _Strip:
         assert model.crossings is not None
         lets_go = model.crossings.slip_limit is not None or curve.dashpot > 0.0
 
+        soon = out * SOON if lets_go else np.zeros(0)
+
         def corners() -> Iterator[float]:
-            yield out
+            yield from (*soon, out)
             if case.hold_s > 0.0:
                 yield from out + case.hold_s * (HELD if lets_go else HELD[-1:])
             if case.unload:
                 self._take(curve.back or curve)
-                yield end
+                yield from (*(out + case.hold_s + soon), end)
 
-        planned = (out * np.arange(1, stops + 1) / max(stops, 1)).tolist()
+        stops = min(stops, round(out / case.solver.largest_step_s))
+        planned = [*soon[-1:], *(out * np.arange(1, stops + 1) / max(stops, 1))]
         standing = Standing(model, case, planned) if stops and lets_go else None
 
         def kept(newton: Newton, time: float) -> None:
