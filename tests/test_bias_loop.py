@@ -218,6 +218,24 @@ def test_what_slipped_holds_while_the_crosshead_stands():
     assert angle[rested] == pytest.approx(exact["shear_angle_deg"][rested], abs=0.05)
 
 
+def test_what_crossings_remember_does_not_end_with_a_short_record():
+    """Friction on the way that strips are solved along, however few readings there are of it."""
+
+    def curve(count):
+        test = BiasExtension([measured(pulled(count=count, back=True))])
+        forms = (v for e in test.effects if e.name == "crossover_friction" for v in e.variants)
+        friction = next(v for v in forms if v.label == "Dahl")
+        values = VALUES | {p.name: (p.starts or (0.01,))[0] for p in friction.parameters}
+        for p in friction.amplitudes:
+            values[p.name] = 0.01
+        return test._models.curve((friction,), values)
+
+    few, many = curve(15), curve(141)
+    assert many.moments[-1] > many.back.moments[-1]
+    assert few.moments == pytest.approx(many.moments, rel=1e-9)
+    assert few.back.moments == pytest.approx(many.back.moments, rel=1e-3)
+
+
 def test_a_hold_does_not_make_a_crosshead_slow():
     """Strips are solved at the speed it moves with, wherever in a hold it is read furthest."""
     D = np.concatenate([np.linspace(0.0, TRAVEL, 15), np.full(30, TRAVEL)])

@@ -326,6 +326,13 @@ class Model:
         """Shear angle γ at each crossing of the net [rad], on every rank."""
         return np.zeros(0) if self.crossings is None else self.crossings.angles()
 
+    def axes_angles(self) -> Array:
+        """Change of the angle between the tows' axes at each crossing [rad], on every rank.
+
+        That of a snapshot, without what else is in it.
+        """
+        return self._seen.shear()
+
     def outside(self) -> dict[str, Array]:
         """What weight, and pressure and friction of each tool, do on w at the last increment.
 

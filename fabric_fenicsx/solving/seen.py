@@ -76,11 +76,10 @@ class Seen:
             outside: as of ``Model.outside``.
         """
         model, disc = self._model, self._model.disc
-        u, q = disc.current()
         pressure = np.zeros((disc.owned, 1))
         for tool in model.tools:
             pressure[:, 0] += np.linalg.norm(outside[tool.name][:, :3], axis=1)
-        around = self._copies(np.hstack([u[: disc.owned], q[: disc.owned], pressure]))
+        around = self._around(pressure)
         nodal = around[self._places]
         forces = disc.in_order("cells", model.system.section_forces())
         axes = self._axes.at(around[:, :3])
@@ -103,6 +102,17 @@ class Seen:
             crossing_moment=moment,
         )
 
+    def own_shear(self) -> Array:
+        """Of this rank's part what a snapshot has as ``shear_angle``, alone. Collective."""
+        around = self._around(np.zeros((self._model.disc.owned, 1)))
+        return np.asarray(axes_shear(self._axes.at(around[:, :3])) - self._reference_shear)
+
+    def _around(self, pressure: Array) -> Array:
+        """Displacement, quaternion and contact force of all nodes that this rank looks at."""
+        disc = self._model.disc
+        u, q = disc.current()
+        return self._copies(np.hstack([u[: disc.owned], q[: disc.owned], pressure]))
+
     @cached_property
     def _gathers(self) -> dict[Where, Gather]:
         disc = self._model.disc
@@ -124,3 +134,10 @@ class Seen:
             rows = self._gathers[PLACES[name]](values.reshape(len(values), width), to=to)
             arrays[name] = rows.reshape(-1, *values.shape[1:])
         return Snapshot(time=own.time, **arrays)
+
+    def shear(self) -> Array:
+        """Of the whole net what a snapshot has as ``shear_angle``, alone. Collective."""
+        own = self.own_shear()
+        if self._model.comm.size == 1:
+            return own
+        return self._gathers["crossings"](own[:, None], to=None)[:, 0]

@@ -37,7 +37,7 @@ from .recorded_rig import RecordedRig
 from .records import of_a_crossing, runs_before, typical
 from .slipping import Slips
 
-__all__ = ["CrossheadTest"]
+__all__ = ["BASELINE", "CrossheadTest"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -420,10 +420,10 @@ class CrossheadTest:
             by: derivatives that are wanted; by default all there are.
         """
         known = self._kinematics(travel, values)
-        moment = self._moment(None, known, values)
+        moment = self._moment(None, known, values, self._counts)
         for v in variants:
             if v.laws is not None:
-                moment += self._moment(v, known, values)
+                moment += self._moment(v, known, values, self._counts)
         factor = known["factor"]
         if by is not None:
             moment, factor = (
@@ -437,9 +437,20 @@ class CrossheadTest:
         )
 
     def _moment(
-        self, variant: FrameVariant | None, known: dict[str, Varying], values: Mapping[str, float]
+        self,
+        variant: FrameVariant | None,
+        known: dict[str, Varying],
+        values: Mapping[str, float],
+        count: Array | None = None,
     ) -> Varying:
-        """Moment per area [N] of the baseline or of an effect."""
+        """Moment per area [N] of the baseline or of an effect.
+
+        Args:
+            variant: the effect's form; None: the baseline's.
+            known: what the laws go by at each point of each record.
+            values: of the parameters.
+            count: points of each record that are asked for; by default all.
+        """
         key = ((variant.like or variant) if variant is not None else None, "moment")
         if key not in self._compiled:
             parameters = BASELINE if variant is None else variant.parameters
@@ -463,13 +474,13 @@ class CrossheadTest:
                 history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
             self._compiled[key] = marched.define({"moment": moment}, history)
         if known is not self._still:
-            return self._made_moment(variant, key, known, values)
+            return self._made_moment(variant, key, known, values, count)
         # Beside each of many effects the same model again: its moments are known.
         own = BASELINE if variant is None else variant.parameters
         of_baseline = () if variant is None else variant.of_baseline
         numbers = tuple(values[name] for name in (*(p.name for p in own), *of_baseline))
         return self._kept_moments(
-            variant, (known, numbers), lambda: self._made_moment(variant, key, known, values)
+            variant, (known, numbers), lambda: self._made_moment(variant, key, known, values, count)
         )
 
     def _made_moment(
@@ -478,10 +489,11 @@ class CrossheadTest:
         key: Any,
         known: dict[str, Varying],
         values: Mapping[str, float],
+        count: Array | None,
     ) -> Varying:
         """The same from its compiled expressions."""
         first = {} if variant is None else self._from_earlier_runs(variant)
-        moment = self._compiled[key](known, values, first, self._counts)["moment"]
+        moment = self._compiled[key](known, values, first, count)["moment"]
         if variant is None or variant.by_run is None:
             return moment
         return moment * self._by_run(variant, values)

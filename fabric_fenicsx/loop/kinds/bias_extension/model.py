@@ -150,7 +150,7 @@ class BiasExtension(CrossheadTest):
             return
         laws = crossing_laws(fabric.crossover)
         frames = [FrameVariant("the frame's", (), laws=lambda _: laws)]
-        moments = at_knots(self._moment_of(frames, {}), self._typical_rate).value
+        moments = at_knots(self._moment_of(frames, {}), self._typical_rate)[0].value
         curve = locking(np.radians(KNOTS), moments)
         if curve[-1] > 0.0:
             form = locking_variant(np.radians(KNOTS), curve)

@@ -114,11 +114,9 @@ class Standing:
         """
         model = self._model
         self._settle(newton, time)
-        snapshot = model.snapshot(time)
         force = float(model.reactions()[self._upper, 1].sum())
-        middle = float(snapshot.shear_angle[self._middle].mean())
-        lever = self._lever(newton, time)
-        self._rows.append((force, snapshot.director_turn, middle, lever))
+        angles, middle = model.shear_angles(), float(model.axes_angles()[self._middle].mean())
+        self._rows.append((force, angles, middle, self._lever(newton, time)))
         self._times.append(time)
         newton.x.set(0.0)
         model.system.set_increment(newton.x)

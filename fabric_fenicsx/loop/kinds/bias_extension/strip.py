@@ -31,7 +31,6 @@ from ....rigs.crosshead import crosshead, duration
 from ....solving.model import Model
 from ....solving.newton import Newton
 from ....solving.sections import diagonals
-from ....solving.snapshot import Snapshot
 from ....solving.stepping import Step, Stepper
 from ...measurement.case import measured_case, tow_of
 from ...measurement.schema import FILE, Measurement, Run
@@ -209,7 +208,7 @@ def pulled(
     model: Model,
     case: BiasExtensionCase,
     corners: Iterable[float],
-    seen: Callable[[Snapshot], None] = lambda snapshot: None,
+    seen: Callable[[], None] = lambda: None,
     kept: Callable[[Newton, float], None] = lambda newton, time: None,
     longest: Callable[[float], float] | None = None,
 ) -> tuple[Array, Array, Array]:
@@ -220,7 +219,7 @@ def pulled(
         case: of it.
         corners: times at which its motion changes, the end at last [s]; each is asked for when the
             one before it has been reached.
-        seen: given each step's snapshot.
+        seen: called after each step, before that becomes the state to go on from.
         kept: given the solver and the time where that has become the state to go on from.
         longest: step [s] from a time on until the next corner; by default the case's.
 
@@ -235,10 +234,9 @@ def pulled(
     rows = [(0.0, 0.0, 0.0)]
 
     def observe(step: Step) -> None:
-        snapshot = model.snapshot(step.time)
-        seen(snapshot)
+        seen()
         force = float(model.reactions()[upper, 1].sum())
-        rows.append((step.time, force, float(snapshot.shear_angle[middle].mean())))
+        rows.append((step.time, force, float(model.axes_angles()[middle].mean())))
 
     keys = case.solver
     newton = model.newton(force_tolerance=keys.force_tolerance_N, limit=keys.iteration_limit)
@@ -417,7 +415,7 @@ class _Strip:
             model,
             case,
             corners(),
-            lambda snapshot: angles.append(snapshot.director_turn),
+            lambda: angles.append(model.shear_angles()),
             kept,
             longest,
         )

@@ -17,9 +17,12 @@ import numpy.typing as npt
 from ....errors import SolveError
 from ...expressions.marching import Varying
 from ...inference.effects import Variant
+from ...inference.first_order import SMALL
+from ...kept import Kept
+from ..crosshead import BASELINE
 from ..drape.shear_field import hermite_weights
 from ..picture_frame.variant import FrameVariant
-from .curves import Moment, at_knots, at_knots_back
+from .curves import Moment, at_knots
 from .effects import StripPullVariant
 from .mixture import Holds, Part, number
 from .phases import Phases
@@ -33,6 +36,8 @@ Array = npt.NDArray[np.float64]
 
 #: Parameter of the baseline's dashpot.
 DASHPOT = "c1_N_s"
+#: Models of which it is kept what their crossings' curves are.
+KEPT = 4
 #: Share by which a curve, a slip or a crimp may differ from those that a fit was solved with.
 SETTLED = 0.02
 #: Share of what strips are solved at below which an effect is none.
@@ -77,13 +82,14 @@ class StripModels:
         self._strips, self._out, self._moment_of = strips, out, moment_of
         self._corrections: dict[frozenset[Variant], Correction] = {}
         self._settled: dict[frozenset[Variant], tuple[Solved, dict[str, Any]]] = {}
+        self._known: Kept[tuple[Varying, Array | None]] = Kept(KEPT)
         self._reached = reached(first, out.furthest)
         self._reached /= float(self._reached @ first.curve.moments)
 
     def parts(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[Part]:
         """What is known of the strips of a model, solved now where that is not enough."""
-        moments = self._moments(variants, values)
-        curve = self._curve_of(variants, values, moments.value)
+        moments, back = self._moments(variants, values)
+        curve = self._curve_of(values, moments.value, back)
         base, parts = number(1.0), list[tuple[Wanted, Varying, Varying]]()
         for v in pulled(variants):
             assert v.changes is not None
@@ -92,7 +98,7 @@ class StripModels:
             if v.per_force:
                 size = self._size(moments)
                 amplitude = amplitude * size
-                mine = self._curve_of(variants, values, moments.value, float(size.value))
+                mine = self._curve_of(values, moments.value, back, float(size.value))
             at = float(amplitude.value)
             for node, weight, slope in zip(*hermite_weights(v.solved_at, at), strict=True):
                 part = number(weight, {p: slope * d for p, d in amplitude.slopes.items()})
@@ -154,26 +160,38 @@ class StripModels:
 
     def curve(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Curve:
         """The curves of a model; of all but the baseline's dashpot, which is solved as such."""
-        return self._curve_of(variants, values, self._moments(variants, values).value)
+        moments, back = self._moments(variants, values)
+        return self._curve_of(values, moments.value, back)
 
     def _curve_of(
-        self,
-        variants: Sequence[Variant],
-        values: Mapping[str, float],
-        moments: Array,
-        size: float = 1.0,
+        self, values: Mapping[str, float], moments: Array, back: Array | None, size: float = 1.0
     ) -> Curve:
-        """The same with these moments on the way out, at KNOTS, over a size."""
-        out, dashpot = self._out, values[DASHPOT]
-        viscous, back = dashpot * out.rate, None
-        if out.return_too:
-            moment = self._moment_of(_laws(variants), values)
-            back = (at_knots_back(moment, out.rate, out.top) + viscous) / size
-        return Curve.through((moments - viscous) / size, dashpot / size, back)
+        """The same with moments on the way out, and back, at KNOTS, over a size."""
+        dashpot = values[DASHPOT]
+        viscous = dashpot * self._out.rate
+        on_the_way_back = None if back is None else (back + viscous) / size
+        return Curve.through((moments - viscous) / size, dashpot / size, on_the_way_back)
 
-    def _moments(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Varying:
-        """Moments of a model on one way out at the speed of the runs, at KNOTS."""
-        return at_knots(self._moment_of(_laws(variants), values), self._out.rate)
+    def _moments(
+        self, variants: Sequence[Variant], values: Mapping[str, float]
+    ) -> tuple[Varying, Array | None]:
+        """Moments of a model on one way out at the speed of the runs, at KNOTS, and on that back.
+
+        Thousands of models differ by next to nothing of a law: without it they are the same. By
+        how much the size of all forces goes with it is asked for where that counts.
+        """
+        forms = _laws(variants)
+        if not any(v.per_force for v in pulled(variants)):
+            forms = [v for v in forms if v is None or _there_is(v, values)]
+        names = [p.name for p in BASELINE]
+        names += [p.name for v in forms if v is not None for p in v.parameters]
+
+        def made() -> tuple[Varying, Array | None]:
+            out = self._out
+            top = out.top if out.return_too else None
+            return at_knots(self._moment_of(forms, values), out.rate, top)
+
+        return self._known(tuple(forms), (tuple(values[name] for name in names),), made)
 
     def _size(self, moments: Varying) -> Varying:
         """Work of moments at KNOTS, over that of the first strips' curve on the same way."""
@@ -188,6 +206,12 @@ def _laws(variants: Sequence[Variant]) -> list[FrameVariant | None]:
     """The baseline's laws and those of forms."""
     own = [v for v in variants if isinstance(v, FrameVariant) and v.laws is not None]
     return [None, *own]
+
+
+def _there_is(variant: Variant, values: Mapping[str, float]) -> bool:
+    """Whether there is more than next to nothing of a form."""
+    amplitudes = variant.amplitudes
+    return not amplitudes or any(abs(values[p.name]) > SMALL for p in amplitudes)
 
 
 def pulled(variants: Sequence[Variant]) -> list[StripPullVariant]:
