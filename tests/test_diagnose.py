@@ -178,7 +178,7 @@ def test_what_is_left_of_nothing_is_in_no_model_of_several(tmp_path, monkeypatch
     """An effect whose amplitude ends at nothing beside others: the model is that of the others."""
     RECIPES["pair-crossover_friction-shear_locking"](tmp_path / "set")
     test = PictureFrame([read_measurement(tmp_path / "set")])
-    names = ("crosshead_backlash", "crossover_friction", "shear_locking")
+    names = ("crossover_friction", "shear_locking")
     search = Search(test, [e for e in test.effects if e.name in names], lambda done, what: None)
     fitted = search._together
 
@@ -248,24 +248,32 @@ def test_a_title_is_text_and_no_markup(tmp_path):
     path = folder / "measurement.yaml"
     content = yaml.safe_load(path.read_text()) | {"title": "a < b <script>x</script>"}
     path.write_text(yaml.safe_dump(content))
-    assert command("diagnose", folder, "--out", tmp_path / "out", "--quiet") == 0
+    few = ("--effects", "load_drift", "--quiet")
+    assert command("diagnose", folder, *few, "--out", tmp_path / "out") == 0
     assert "<script>" not in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_the_same_data_give_the_same_report(diagnosed, tmp_path):
-    folder, out = diagnosed["none-shear-declared"]
-    assert command("diagnose", folder, "--out", tmp_path, "--quiet") == 0
-    for name in ("report.json", "report.html"):
-        assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
+#: Of all effects.
+FEW = ["crossover_friction", "load_drift"]
 
 
-def test_effects_narrows_the_search(diagnosed, tmp_path, capsys):
-    folder, _ = diagnosed["crossover_friction-dahl"]
-    names = ["crossover_friction", "load_drift"]
+@pytest.fixture(scope="module")
+def narrowed(diagnosed, tmp_path_factory):
+    """Folders of measurement and of a report among few effects."""
+    folder, out = diagnosed["crossover_friction-dahl"][0], tmp_path_factory.mktemp("narrowed")
+    assert command("diagnose", folder, "--out", out, "--effects", ",".join(FEW), "--quiet") == 0
+    return folder, out
+
+
+def test_the_same_data_give_the_same_report_and_the_search_is_narrow(narrowed, tmp_path, capsys):
+    folder, out = narrowed
+    names = FEW
     # As an earlier diagnosis into the same folder leaves it, which explained nothing.
     (tmp_path / NEAREST).write_text("# of other measurements")
     assert command("diagnose", folder, "--out", tmp_path, "--effects", ", ".join(names)) == 0
     assert not (tmp_path / NEAREST).exists()
+    for name in ("report.json", "report.html"):
+        assert (tmp_path / name).read_bytes() == (out / name).read_bytes()
     report = report_of(tmp_path)
     assert [candidate["name"] for candidate in report["candidates"]] == names
     printed = capsys.readouterr().out
@@ -368,11 +376,9 @@ def on_two_ranks(*arguments):
     )
 
 
-def test_two_ranks_report_the_same(diagnosed, tmp_path):
-    folder, _ = diagnosed["crossover_friction-dahl"]
-    out, few = tmp_path / "one", ("--effects", "crossover_friction,load_drift")
-    assert command("diagnose", folder, *few, "--out", out, "--quiet") == 0
-    process = on_two_ranks(folder, *few, "--out", tmp_path / "two")
+def test_two_ranks_report_the_same(narrowed, tmp_path):
+    folder, out = narrowed
+    process = on_two_ranks(folder, "--effects", ",".join(FEW), "--out", tmp_path / "two")
     assert process.returncode == 0, process.stderr
     assert (tmp_path / "two/report.json").read_bytes() == (out / "report.json").read_bytes()
     assert process.stdout.count(b"effect_found") == 1
