@@ -62,6 +62,16 @@ def test_terms_know_whose_general_form_they_are(back):
     assert once[damage] == ("shear_locking",)
 
 
+def test_what_gives_way_by_the_force_may_be_either_of_two():
+    """In series with the strip; by what it gives way by another variable is neither."""
+    ranges = RANGES | dict.fromkeys(("force_per_width", "largest_force_per_width"), 1.0)
+    slips = [t for t in strip_terms(ranges | {"pinned_angle": 0.5}) if t.acts_on == "slip"]
+    assert {t.depends_on for t in slips} == {("force",), ("angle",)}
+    for term in slips:
+        either = ("crossover_slip", "tow_uncrimping") if term.depends_on == ("force",) else ()
+        assert term.in_general == either
+
+
 def test_angles_alone_have_no_terms():
     test = BiasExtension([with_angles(of_runs(run_of(force=np.full(29, np.nan))))])
     assert test.terms == [] and "shear_locking" in test.alike

@@ -324,7 +324,7 @@ def test_a_term_that_is_a_listed_effect_says_so(kind, term, name):
     ranges |= {"stiffness_per_C1": 1e-5, "runs": 1.0, "overhangs": 3.0}
     every = strip_terms(ranges, ()) if kind == "cantilever" else frame_terms(ranges)
     (effect,) = (e for e in every if e.name == term)
-    assert effect.in_general == (name or "")
+    assert effect.in_general == ((name,) if name else ())
     listed = [*CANTILEVER_EFFECTS, *PICTURE_FRAME_EFFECTS]
     fitted = SimpleNamespace(at_bound=(), errors={})
     diagnosis = SimpleNamespace(

@@ -72,7 +72,7 @@ class Row:
     truth: Truth
     verdict: str
     effects: tuple[str, ...]
-    in_general: frozenset[str]
+    in_general: tuple[tuple[str, ...], ...]
     rivals: dict[str, list[str]]
     before: float
     after: float
@@ -83,7 +83,8 @@ class Row:
         # A term without a formula may have come near an effect on no list; its name is not judged.
         allowed = [self.truth.verdict]
         allowed += ["effect_discovered"] * (self.truth.verdict == "unexplained")
-        if self.verdict == "effect_discovered" and self.in_general in self.truth.acceptable:
+        terms = [frozenset(names) for names in product(*self.in_general)]
+        if self.verdict == "effect_discovered" and set(terms) & set(self.truth.acceptable):
             # A term that is the effect, whatever its shape.
             return True
         if self.verdict not in allowed:
@@ -127,7 +128,7 @@ def rows(
                     found = diagnose_test(experiment)
                 except SolveError:
                     nothing = (float("nan"), float("nan"))
-                    yield Row(seed, recipe.name, truth, "not fitted", (), frozenset(), {}, *nothing)
+                    yield Row(seed, recipe.name, truth, "not fitted", (), (), {}, *nothing)
                     continue
             yield Row(
                 seed,
@@ -135,7 +136,7 @@ def rows(
                 truth,
                 found.verdict,
                 tuple(effect.name for effect in found.effects),
-                frozenset(e.name if e.listed else e.in_general for e in found.effects),
+                tuple((e.name,) if e.listed else e.in_general for e in found.effects),
                 found.rivals,
                 found.holdout_before / truth.noise,
                 found.holdout_after / truth.noise,

@@ -113,8 +113,8 @@ class Effect:
             effect that has a name.
         depends_on: of such a term, what it is a function of.
         general_form_of: of such a term, names of listed effects that it has as a special case.
-        in_general: the listed effect that such a term is, whatever its shape; empty where it is
-            none.
+        in_general: the listed effects of which such a term is one, whatever its shape; empty where
+            it is none.
         of_two: of such a term, whether it is looked at only where none over one variable will do.
     """
 
@@ -126,7 +126,7 @@ class Effect:
     acts_on: str = ""
     depends_on: tuple[str, ...] = ()
     general_form_of: tuple[str, ...] = ()
-    in_general: str = ""
+    in_general: tuple[str, ...] = ()
     of_two: bool = False
 
     @property

@@ -301,8 +301,8 @@ def discovered_report(d: Diagnosis, terms: Sequence[Discovered]) -> list[dict[st
     def rivals(term: Discovered) -> list[dict[str, Any]]:
         effect, factor_of = term.effect, term.variant.factor_of
         own = effect.in_general
-        found = [rival(name) for name in d.rivals.get(effect.name, []) if name != own]
-        whatever: list[dict[str, Any]] = [{"name": own}] if own else []
+        found = [rival(name) for name in d.rivals.get(effect.name, []) if name not in own]
+        whatever: list[dict[str, Any]] = [{"name": name} for name in own]
         if factor_of:
             both = [factor_of, *effect.depends_on]
             found = [r for r in found if set(r.get("depends_on", ())) != set(both)]

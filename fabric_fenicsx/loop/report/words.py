@@ -164,7 +164,7 @@ def _not_told(term: Mapping[str, Any]) -> str:
         words = [*listed, *(f"the {_acts_on(r)} by {_variables(r)}" for r in others)]
         words = list(dict.fromkeys(words))
         text = f" This data cannot tell {term['name']} from {one_of(words)}." if words else ""
-        is_one = "".join(f" It is {name} in a form that is on no list." for name in in_general)
+        is_one = f" It is {one_of(in_general)} in a form that is on no list." if in_general else ""
         is_one += "".join(
             f" As a factor of the {r['depends_on'][0]} it is a {_acts_on(r)} by {_variables(r)}."
             for r in whatever

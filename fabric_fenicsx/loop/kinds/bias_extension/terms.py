@@ -39,6 +39,10 @@ OF_ONE_WAY = {
 }
 """... and those of strips that never go back, along which the path is the angle."""
 
+BY_FORCE = ("slip_of_force_per_width", "slip_of_largest_force_per_width")
+IN_SERIES = ("crossover_slip", "tow_uncrimping")
+"""Terms of what gives way in a strip by its force, and the listed effects that they may be."""
+
 
 def strip_terms(
     ranges: Mapping[str, float], ends: Ends = MappingProxyType({}), *, goes_back: bool = True
@@ -58,6 +62,7 @@ def strip_terms(
             general_form_of=tuple(
                 effect for name, effect in general.items() if term.name.startswith(name)
             ),
+            in_general=IN_SERIES if term.name in BY_FORCE else term.in_general,
         )
         for term in terms(ranges, ends, rig=STRIP_RIG)
         if not term.name.startswith("even")

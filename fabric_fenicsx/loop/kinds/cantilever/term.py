@@ -54,7 +54,7 @@ def strip_effect(
     depends_on: tuple[str, ...],
     forms: Iterable[StripVariant],
     general_form_of: tuple[str, ...] = (),
-    in_general: str = "",
+    in_general: tuple[str, ...] = (),
     of_two: bool = False,
 ) -> Effect:
     """A term of its forms."""

@@ -194,9 +194,9 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
         )
         for label, parameters, g in splines(name, SPLINES)
     ]
-    about, of = "any odd law of the curvature", "nonlinear_bending"
+    about, of = "any odd law of the curvature", ("nonlinear_bending",)
     yield strip_effect(
-        name, about, "bending_moment", ("curvature",), forms, general_form_of=(of,), in_general=of
+        name, about, "bending_moment", ("curvature",), forms, general_form_of=of, in_general=of
     )
 
     for acts_on, unit, about in on_the_strip(ranges):
@@ -217,7 +217,7 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
             ]
             words = f"{about} that varies along the strip"
             # However it does, a strip that is not flat unloaded has one of these.
-            whatever = "residual_curvature" if constant else ""
+            whatever = ("residual_curvature",) if constant else ()
             yield strip_effect(name, words, acts_on, depends_on, forms, in_general=whatever)
         name = f"{acts_on}_of_length"
         forms = [

@@ -68,10 +68,10 @@ OVERTONES = {"time": (0, 2), "angle": (0, 2)}
 
 
 IN_GENERAL = {
-    "dissipative_moment_of_direction": "crossover_friction",
-    "dissipative_moment_of_angle": "crossover_friction",
-    "even_moment_of_angle": "tension_coupling",
-    "odd_in_rate_moment_of_rate": "rate_hardening",
+    "dissipative_moment_of_direction": ("crossover_friction",),
+    "dissipative_moment_of_angle": ("crossover_friction",),
+    "even_moment_of_angle": ("tension_coupling",),
+    "odd_in_rate_moment_of_rate": ("rate_hardening",),
 }
 """Listed effects that terms are, whatever their shape."""
 
@@ -169,7 +169,7 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
                 of_fabric=not base.startswith("even"),
                 acts_on="moment",
                 depends_on=depends_on,
-                in_general=IN_GENERAL.get(name, ""),
+                in_general=IN_GENERAL.get(name, ()),
             )
 
 
