@@ -13,6 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.kinds.bias_extension import BIAS_EXTENSION, BiasExtensionRig, solved
+from fabric_fenicsx.loop.kinds.bias_extension.curves import KNOTS, Curve
 from fabric_fenicsx.loop.kinds.bias_extension.frame_law import (
     LIKE_THE_FRAME,
     locking,
@@ -24,8 +25,6 @@ from fabric_fenicsx.loop.kinds.bias_extension.phases import backward, phases_of,
 from fabric_fenicsx.loop.kinds.bias_extension.quantities import read_together
 from fabric_fenicsx.loop.kinds.bias_extension.solved import Way
 from fabric_fenicsx.loop.kinds.bias_extension.strip import (
-    KNOTS,
-    Curve,
     solved_strip,
     strip_case,
 )

@@ -22,8 +22,8 @@ from test_drape_loop import angle, made_up, marks, written
 from fabric_fenicsx.__main__ import main
 from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.fabric import NEAREST
-from fabric_fenicsx.loop.inference.models import nothing_left
 from fabric_fenicsx.loop.inference.one_search import Search
+from fabric_fenicsx.loop.inference.ranking import nothing_left
 from fabric_fenicsx.loop.kinds.drape import model as drape
 from fabric_fenicsx.loop.kinds.drape.model import Drape
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame

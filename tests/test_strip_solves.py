@@ -17,7 +17,8 @@ from scipy.interpolate import PchipInterpolator
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop import workers
 from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig, strip
-from fabric_fenicsx.loop.kinds.bias_extension.strip import KNOTS, Curve, solved_strip, strip_case
+from fabric_fenicsx.loop.kinds.bias_extension.curves import KNOTS, Curve
+from fabric_fenicsx.loop.kinds.bias_extension.strip import solved_strip, strip_case
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.rigs.bias_extension import build
 

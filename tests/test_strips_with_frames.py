@@ -13,9 +13,10 @@ from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig
 from fabric_fenicsx.loop.kinds.bias_extension.centred import CentredBiasExtension
+from fabric_fenicsx.loop.kinds.bias_extension.curves import KNOTS, Curve
 from fabric_fenicsx.loop.kinds.bias_extension.frame_law import FRAME_SHARE, foretold, in_thirds
 from fabric_fenicsx.loop.kinds.bias_extension.settling import LEFT, ROUNDS, Settling
-from fabric_fenicsx.loop.kinds.bias_extension.strip import KNOTS, Curve, solved_strip, strip_case
+from fabric_fenicsx.loop.kinds.bias_extension.strip import solved_strip, strip_case
 from fabric_fenicsx.loop.kinds.bias_extension.with_frames import (
     held,
     shared_locking,

@@ -25,9 +25,10 @@ from .experiment import Experiment
 from .first_order import Combination, ToFirstOrder
 from .fitting import Fit, fit
 from .judge import Model
-from .models import Models, nothing_left, simplest_first
+from .models import Models
 from .noise import quantum
 from .notes import errors_beside, noise_source, notes_of
+from .ranking import nothing_left, simplest_first
 from .rivals import InPlace, in_place, pairs_of, rivals_of
 from .screen import Screen, Signatures
 from .validation import laboratories

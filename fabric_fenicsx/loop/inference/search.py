@@ -20,8 +20,8 @@ from .effects import Effect
 from .experiment import Experiment
 from .fitting import Fit
 from .judge import Model
-from .models import nearest_forms
 from .one_search import Search
+from .ranking import nearest_forms
 from .rivals import near
 
 __all__ = ["diagnose_test"]

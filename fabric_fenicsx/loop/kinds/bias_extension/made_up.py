@@ -23,9 +23,10 @@ from ...measurement.kind import MadeUp
 from ...measurement.schema import Measurement, Run, fabric_keys
 from ..picture_frame.variant import FrameVariant
 from . import BiasExtensionRig
+from .curves import KNOTS, Curve
 from .model import BiasExtension
 from .quantities import ANGLE
-from .strip import KNOTS, Curve, pulled
+from .strip import pulled
 
 __all__ = ["made_up"]
 

@@ -33,7 +33,7 @@ from ..crosshead import CrossheadTest
 from ..picture_frame.model import SAME_RATE
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
-from .curves import Moment, at_knots
+from .curves import KNOTS, Curve, Moment, at_knots
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
 from .even_shear import EVEN, IN_WORDS, EvenZones, of_both
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
@@ -43,7 +43,7 @@ from .phases import GONE_BACK, Phase, backward, moving, parted, phases_of, since
 from .quantities import coarser, first_curve, read_together, strip_of
 from .settled import Quantity
 from .solved import GROUPS, Solved, SolvedStrips
-from .strip import KNOTS, Curve, strip_case
+from .strip import strip_case
 from .strip_models import StripModels, WaysOut
 from .terms import strip_terms
 

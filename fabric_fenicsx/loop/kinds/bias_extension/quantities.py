@@ -18,7 +18,7 @@ from ...inference.experiment import Another, Readings
 from ...inference.noise import roughness
 from ...measurement.readings import common_noise
 from ...measurement.schema import Measurement, Run
-from .strip import KNOTS, Curve
+from .curves import KNOTS, Curve
 
 __all__ = [
     "ANGLE",

@@ -23,9 +23,10 @@ from ....errors import SolveError
 from ...copies import put_off_in_copies
 from ...measurement.schema import Measurement, Run
 from ...workers import each_of
+from .curves import KNOTS, Curve
 from .phases import SIGN, Phase, Phases
 from .standing import AtRest, Hold
-from .strip import KNOTS, STEPS, Curve, StripPath, solved_strip, strip_case
+from .strip import STEPS, StripPath, solved_strip, strip_case
 
 __all__ = [
     "GROUPS",

@@ -1,8 +1,7 @@
 """A strip pulled by the finite elements, out and where it is wanted back: what its crossings did.
 
-A law of the crossings without memory is known by its curve m(γ); any other goes through one such
-curve on the way out and through another on the way back. The strip is solved with these curves, as
-tables, and a linear dashpot, so that nothing is compiled for another law.
+The strip is solved with curves m(γ) of its crossings (see curves), as tables, and a linear dashpot,
+so that nothing is compiled for another law.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import PPoly
 
 from ...._dolfinx import Function
 from ....errors import InputError, SolveError
@@ -34,15 +32,13 @@ from ....solving.sections import diagonals
 from ....solving.stepping import Step, Stepper
 from ...measurement.case import measured_case, tow_of
 from ...measurement.schema import FILE, Measurement, Run
+from .curves import KNOTS, Curve
 from .standing import AtRest, Hold, Standing
 
-__all__ = ["KNOTS", "SOON", "Curve", "StripPath", "pulled", "solved_strip", "strip_case"]
+__all__ = ["SOON", "StripPath", "pulled", "solved_strip", "strip_case"]
 
 Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
-#: Angles [degrees] at which a curve is given; the last piece goes on straight.
-KNOTS = np.array([0.0, 3.0, 8.0, 14.0, 20.0, 26.0, 32.0, 38.0, 44.0, 50.0, 56.0, 62.0, 70.0])
 #: Steps of a way out, if none fails: where others are foretold of it, and where it is itself meant.
 STEPS, FINE_STEPS = 18, 40
 #: Times of a hold that a strip is looked at, as shares of it.
@@ -50,73 +46,12 @@ HELD = np.geomspace(1e-3, 1.0, 18)
 #: Shares of a way that a strip with dashpots or slip is looked at when it has begun: what is in
 #: series with them gives way first.
 SOON = np.array([5e-4, 1.5e-3, 4e-3, 8e-3, 1.6e-2])
-#: Least slope of a curve over the largest moment: nothing else holds crossings that do nothing.
-LEAST_SLOPE = 1e-3
 #: Keys of a crossing that stands for so much fabric.
 OF_A_CROSSING = ("crossover.slip_limit_N", "crossover.translation_N_mm")
 #: Models that are kept: those of three strips, pinned, slipping, crimped and both, and some more.
 KEPT = 16
 #: Of a model that any other is put into.
 ANY_CRIMP = 0.02
-#: Largest moment per area [N/mm] of a curve that does nothing.
-NOTHING = 1e-9
-
-
-@dataclass(frozen=True, slots=True)
-class Curve:
-    """A moment per area m(γ) + β γ̇ [N/mm], m by its values at KNOTS, monotone cubic between, odd.
-
-    Attributes:
-        moments: m at the knots, not falling, 0 at first.
-        dashpot: β [N s/mm].
-        back: the curve on the way back; None: the same.
-    """
-
-    moments: tuple[float, ...]
-    dashpot: float = 0.0
-    back: Curve | None = None
-
-    @classmethod
-    def through(cls, moments: Array, dashpot: float = 0.0, back: Array | None = None) -> Curve:
-        """The nearest with m that does not fall, on the way back with another m.
-
-        Raises:
-            SolveError: a moment is not a number.
-        """
-        if not np.isfinite(moments).all():
-            raise SolveError("the moment of the crossings is not a number")
-        rising = np.maximum.accumulate(np.maximum(moments, 0.0))
-        least = LEAST_SLOPE * max(float(rising[-1]), NOTHING) * np.radians(KNOTS)
-        on_the_way_back = None if back is None else cls.through(back, dashpot)
-        return cls((0.0, *(rising + least)[1:].tolist()), dashpot, on_the_way_back)
-
-    def __call__(self, gamma: Array, rate: Array | float = 0.0) -> Array:
-        """At shear angles [rad] and rates [rad/s]."""
-        m = np.sign(gamma) * _cubics(self)(np.abs(gamma))
-        return np.asarray(m + self.dashpot * rate)
-
-    def at(self, gamma: Array, rate: Array, back: Flags) -> Array:
-        """The same on either way; flags as many, or one for several angles."""
-        out = self(gamma, rate)
-        return out if self.back is None else np.where(back, self.back(gamma, rate), out)
-
-    @property
-    def idle(self) -> bool:
-        """Whether it does next to nothing."""
-        return self.moments[-1] <= NOTHING and self.dashpot == 0.0
-
-    def law(self, area: float) -> TabulatedSpring:
-        """Of a crossing that stands for an area [mm²], the dashpot apart."""
-        return TabulatedSpring(
-            tuple(np.radians(KNOTS).tolist()), tuple(area * m for m in self.moments)
-        )
-
-
-@lru_cache(maxsize=64)
-def _cubics(curve: Curve) -> PPoly:
-    """Of a curve's moments, with the straight piece behind the last knot."""
-    knots, coefficients = curve.law(1.0).numbers_of_cubics()
-    return PPoly(np.reshape(coefficients, (len(knots), -1)).T, [*knots, knots[-1] + 1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -378,29 +313,20 @@ class _Strip:
     def pulled(self, case: BiasExtensionCase, curve: Curve, stops: int) -> StripPath:
         """Pull it, stop it so often as it goes, let it back with the curve of that way."""
         model = self._model
+        assert model.crossings is not None
         places, spacings = model.net.points[model.net.crossings[:, 0]], case.spacings
         area = case.strip.shares(places, spacings) * spacings[0] * spacings[1]
         # What the springs feel is the directors' turn, what a camera sees the axes' angle.
         angles = [np.zeros(len(places))]
-        out, end = 60.0 * case.travel_mm / case.rate_mm_min, duration(case)
-
+        out = 60.0 * case.travel_mm / case.rate_mm_min
+        held = out + case.hold_s
         # Without dashpots and slip all is as it is on the way out.
-        assert model.crossings is not None
         lets_go = model.crossings.slip_limit is not None or curve.dashpot > 0.0
-
-        soon = out * SOON if lets_go else np.zeros(0)
-
-        def corners() -> Iterator[float]:
-            yield from (*soon, out)
-            if case.hold_s > 0.0:
-                yield from out + case.hold_s * (HELD if lets_go else HELD[-1:])
-            if case.unload:
-                self._take(curve.back or curve)
-                yield from (*(out + case.hold_s + soon), end)
-
-        stops = min(stops, round(out / case.solver.largest_step_s))
-        planned = [*soon[-1:], *(out * np.arange(1, stops + 1) / max(stops, 1))]
-        standing = Standing(model, case, planned) if stops and lets_go else None
+        standing = None
+        if stops and lets_go:
+            stops = min(stops, round(out / case.solver.largest_step_s))
+            planned = out * np.arange(1, stops + 1) / stops
+            standing = Standing(model, case, [out * SOON[-1], *planned])
 
         def kept(newton: Newton, time: float) -> None:
             if standing is not None and time <= out * (1.0 + 1e-9):
@@ -408,20 +334,20 @@ class _Strip:
 
         def longest(time: float) -> float:
             """Of a step: while the crosshead stands still nothing turns in between."""
-            stands = out * (1.0 - 1e-9) < time < (out + case.hold_s) * (1.0 - 1e-9)
+            stands = out * (1.0 - 1e-9) < time < held * (1.0 - 1e-9)
             return float("inf") if stands else case.solver.largest_step_s
 
         time, force, middle = pulled(
             model,
             case,
-            corners(),
+            self._corners(case, curve, out, lets_go),
             lambda: angles.append(model.shear_angles()),
             kept,
             longest,
         )
         travel = np.array([crosshead(case, t) for t in time])
         gamma, turn = np.array(angles), int(np.argmin(np.abs(time - out))) + 1
-        last = int(np.argmin(np.abs(time - out - case.hold_s))) + 1
+        last = int(np.argmin(np.abs(time - held))) + 1
         speed = case.rate_mm_min / 60.0
 
         def path(rows: slice, *more: Any) -> StripPath:
@@ -437,3 +363,22 @@ class _Strip:
             over = force[rows] - rest.force[-1], middle[rows] - rest.middle[-1]
             hold = Hold(time[rows] - time[turn - 1], *over)
         return path(way, speed, back, rest, hold)
+
+    def _corners(
+        self, case: BiasExtensionCase, curve: Curve, out: float, lets_go: bool
+    ) -> Iterator[float]:
+        """Times [s] at which it is looked at beside those of its steps; lets it go back.
+
+        Args:
+            case: of the strip.
+            curve: with that of the way back.
+            out: when it is pulled furthest [s].
+            lets_go: whether there are dashpots or slip.
+        """
+        soon = out * SOON if lets_go else np.zeros(0)
+        yield from (*soon, out)
+        if case.hold_s > 0.0:
+            yield from out + case.hold_s * (HELD if lets_go else HELD[-1:])
+        if case.unload:
+            self._take(curve.back or curve)
+            yield from (*(out + case.hold_s + soon), duration(case))

@@ -22,13 +22,13 @@ from ...kept import Kept
 from ..crosshead import BASELINE
 from ..drape.shear_field import hermite_weights
 from ..picture_frame.variant import FrameVariant
-from .curves import Moment, at_knots
+from .curves import Curve, Moment, at_knots
 from .effects import StripPullVariant
 from .mixture import Holds, Part, number
 from .phases import Phases
 from .settled import Correction, Quantity, correction
 from .solved import Solved, SolvedStrips, Wanted, reached
-from .strip import FINE_STEPS, Curve
+from .strip import FINE_STEPS
 
 __all__ = ["StripModels", "WaysOut", "changes_of", "pulled", "solved_by"]
 

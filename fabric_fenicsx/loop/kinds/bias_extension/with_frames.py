@@ -27,17 +27,17 @@ from ...inference.diagnosis import Diagnosis, Joined
 from ...inference.effects import Effect, Variant
 from ...inference.fitting import Fit, groups_of
 from ...inference.judge import Judge
-from ...inference.models import nothing_left
+from ...inference.ranking import nothing_left
 from ...inference.variances import Variances
 from ...measurement.schema import Measurement
 from ..picture_frame.model import PictureFrame
 from ..picture_frame.variant import FrameVariant
 from .centred import CentredBiasExtension
+from .curves import KNOTS, NOTHING, Curve
 from .effects import StripPullVariant
 from .frame_law import FRAME_SHARE, in_thirds, locking, locking_variant
 from .model import BiasExtension
 from .settling import Settled, Settling, left_out
-from .strip import KNOTS, NOTHING, Curve
 
 __all__ = ["SharedLocking", "join", "shared_locking", "way_out"]
 
