@@ -278,6 +278,34 @@ def test_what_differs_between_specimens_may_go_by_two_variables(apart, name):
     assert own.accounted and [e.name for e in own.found.effects] == [name]
 
 
+def test_what_is_far_behind_a_rival_is_tried_in_its_likeliest_form_alone():
+    """That of names which leave noise; what comes near it is tried in all forms."""
+    columns = {
+        "kink": lambda t: np.maximum(t - 0.6, 0.0),
+        "near": lambda t: np.maximum(t - 0.59, 0.0),
+        "also near": lambda t: np.maximum(t - 0.58, 0.0),
+        "far": lambda t: np.sin(9.0 * t),
+        "as far": lambda t: np.sin(11.0 * t),
+    }
+
+    def of_two_forms(name, other):
+        forms = [Variant(own, (Parameter(own, amplitude=True),)) for own in (name, other)]
+        return replace(linear_effect(name, acts_on="reading"), variants=tuple(forms))
+
+    terms = [of_two_forms("near", "also near"), of_two_forms("far", "as far")]
+    test = made(columns, lambda t: 3.0 * columns["kink"](t), [linear_effect("kink"), *terms])
+    named = search(made(columns, lambda t: 3.0 * columns["kink"](t), [linear_effect("kink")]))
+    assert named.accounted
+    forms = {}
+    for rival in (None, named.found.final):
+        own = Search(test, terms, lambda done, what: None, most=1, rival=rival)
+        own.run()
+        fitted = [one.variants for fits in own.models.forms.values() for one in fits]
+        forms[rival is not None] = {v.label for (v,) in filter(None, fitted)}
+    assert forms[False] == {"near", "also near", "far", "as far"}
+    assert {"near", "also near"} < forms[True] and len(forms[True]) == 3
+
+
 @pytest.mark.parametrize(("times", "gives_way"), [(1.4, False), (1.6, True)])
 def test_three_effects_are_not_fitted_where_a_term_leaves_far_less_than_two(times, gives_way):
     test = made({"kink": lambda t: t**2}, lambda t: 3.0 * t**2, [linear_effect("kink")])

@@ -103,7 +103,8 @@ class Criteria:
             to be what specimens differ by that were each tested in a way of their own; made-up.
         far_off: a first start of a form that leaves this many times more than the best start, to
             first order, is not followed; made-up.
-        second_start: ... nor a second start that leaves this many times more; made-up.
+        second_start: ... nor a second start that leaves this many times more, nor further forms of
+            a term whose likeliest one leaves that much more than effects with names; made-up.
     """
 
     far: float = 3.0

@@ -12,7 +12,7 @@ from ...errors import SolveError
 from .beside import forms_beside, signed
 from .criteria import CRITERIA
 from .effects import Effect, Variant
-from .experiment import Experiment, Flags, each_by_itself
+from .experiment import Experiment, each_by_itself
 from .first_order import Combination, Signature, ToFirstOrder
 from .fitting import Fit, fit, parameters_of, soft_size
 from .judge import Judge, Model
@@ -410,19 +410,17 @@ class Models:
             ]
             if sizes[0] > QUIETER * sizes[1]:
                 return level
-            nearest = [(one, self.variances) for one in self._nearest_now(found, rows)]
+            nearest = [(one, self.variances) for one in self._nearest_now(found)]
             again = [one for one in self._each_again(nearest, CRITERIA.far) if not cancelling(one)]
             return self.best_refined([*level, *self.weighed(again)], beside)
         finally:
             self.variances = before
 
-    def _nearest_now(self, found: Sequence[Fit], rows: Flags) -> list[Fit]:
+    def _nearest_now(self, found: Sequence[Fit]) -> list[Fit]:
         """Of some fits the nearest ones, with noise as it is taken to be now; one of each form."""
-        whiten = self.variances.noise.whitener(self.experiment.readings, rows)
         sizes: dict[tuple[Variant, ...], tuple[float, Fit]] = {}
         for one in found:
-            size = soft_size(whiten(one.residual[rows]), CRITERIA.far) + one.penalty
-            size += self.judge.cost(one, self.effects_of(one))
+            size = self.left_by(one) + self.judge.cost(one, self.effects_of(one))
             known = sizes.get(one.variants)
             if not nothing_left(one) and (known is None or size < known[0]):
                 sizes[one.variants] = (size, one)
@@ -434,6 +432,12 @@ class Models:
                 seen[own] += 1
                 taken.append(one)
         return taken
+
+    def left_by(self, model: Fit) -> float:
+        """Size of what a model leaves, with noise as it is taken to be now; see soft_size."""
+        rows = self.judge.rows
+        white = self.variances.noise.whitener(self.experiment.readings, rows)(model.residual[rows])
+        return soft_size(white, CRITERIA.far) + model.penalty
 
     def _each_again(
         self, models: Sequence[tuple[Fit, Variances]], robust: float | None = None

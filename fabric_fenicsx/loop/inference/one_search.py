@@ -41,7 +41,16 @@ AS_FITTED = 0.98
 
 
 class Search:
-    """One search, with what it carries from step to step."""
+    """One search, with what it carries from step to step.
+
+    Args:
+        experiment: the test.
+        effects: that may be found.
+        progress: told the share that is done and what is being done.
+        most: effects in one model; by default as many as there may be.
+        rival: a model of others that leaves noise: what is far behind that in the form that is
+            likely to be its best is not tried in others.
+    """
 
     def __init__(
         self,
@@ -49,9 +58,11 @@ class Search:
         effects: Sequence[Effect],
         progress: Callable[[float, str], None],
         most: int | None = None,
+        rival: Fit | None = None,
     ) -> None:
         self.experiment, self.progress = experiment, progress
         self.effects, self.most = [e for e in effects if not e.of_two], most
+        self._rival = rival
         #: Terms over two variables, which are for where no single effect or other term will do.
         self._of_two = [e for e in effects if e.of_two]
         # With what has no formula there are too many to fit them all.
@@ -290,15 +301,18 @@ class Search:
         ]
         found: list[Fit] = []
         alike: list[Fit] = []
-        tried = self.effects
+        tried: Sequence[Effect] = self.effects
         if self._screened_first:
             # What noise hides as it was about the baseline may be as good as the best.
             tried = screen.most_promising(CRITERIA.terms, CRITERIA.decisive)
         for k, effect in enumerate(tried):
             self.progress(0.1 + 0.4 * k / len(tried), f"fit {effect.name}")
-            own = by_itself(self._signatures[effect])
-            found += self.models.fitted(own, starts=2)
-            alike += self.models.with_alike_specimens(own)
+            first = self._far_behind(screen, effect)
+            found += first
+            if not first:
+                own = by_itself(self._signatures[effect])
+                found += self.models.fitted(own, starts=2)
+                alike += self.models.with_alike_specimens(own)
         # Sizes of fits that allow for specimens and of those that do not are not compared.
         singles = self.models.ranked(found) + self.models.weighed(alike)
         levels.append(self.models.best_refined(singles))
@@ -359,14 +373,32 @@ class Search:
             ranked: effects, the most promising first.
             nearest: criterion of the best model so far.
         """
-        left: dict[Effect, float] = {}
+        left: dict[Effect, tuple[float, Fit]] = {}
         for effect in ranked:
             for model in self.models.fitted([screen.best_form(effect)], starts=1):
-                left[effect] = model.size(CRITERIA.far) + self.judge.cost(model, (effect,))
+                size = model.size(CRITERIA.far) + self.judge.cost(model, (effect,))
+                left[effect] = size, model
         found: list[Fit] = []
-        for effect in sorted(left, key=lambda one: left[one])[: CRITERIA.products]:
-            found += self.models.fitted(by_itself(signs[effect]), starts=1)
+        for effect in sorted(left, key=lambda one: left[one][0])[: CRITERIA.products]:
+            if self._is_far_behind(left[effect][1]):
+                found.append(left[effect][1])
+            else:
+                found += self.models.fitted(by_itself(signs[effect]), starts=1)
         return self.models.ranked(found, nearest)
+
+    def _far_behind(self, screen: Screen, effect: Effect) -> list[Fit]:
+        """The likeliest form of an effect, fitted, if it is far behind the rival; else nothing."""
+        if self._rival is None:
+            return []
+        first = self.models.fitted([screen.best_form(effect)], starts=1)
+        return first if all(map(self._is_far_behind, first)) else []
+
+    def _is_far_behind(self, model: Fit) -> bool:
+        """Whether a fitted model leaves far more than the rival, with noise as it is known now."""
+        if self._rival is None:
+            return False
+        mine, its = (self.models.left_by(one) for one in (model, self._rival))
+        return mine > CRITERIA.second_start * its
 
     def _screened(self) -> Screen:
         """All effects to first order about the baseline, with the variances as they are now."""

@@ -120,7 +120,8 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
     assert found is not None and chosen is not None
     single, other, least = further, further.found, doubt.least
     if len(chosen.effects) < 2 or other is None:
-        single = Search(search.experiment, doubt.terms, search.progress, most=1)
+        rival = _that_leaves_noise(search)
+        single = Search(search.experiment, doubt.terms, search.progress, most=1, rival=rival)
         other = single.run()
     search.judge.compared = True
     final = search.judge.weighed(chosen.fit, chosen.effects)
@@ -160,6 +161,13 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
     if len(found.effects) == 1 and doubt.rivals:
         _name_terms(search, final, single)
     return found
+
+
+def _that_leaves_noise(search: Search) -> Fit | None:
+    """The effects with a name that a search has chosen, if they leave noise in what was fitted."""
+    chosen = search.chosen
+    assert chosen is not None
+    return chosen.fit if chosen.effects and search.accounted else None
 
 
 def _in_their_place(search: Search, further: Search, single: Search, gain: float) -> Diagnosis:
