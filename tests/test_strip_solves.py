@@ -16,8 +16,9 @@ from scipy.interpolate import PchipInterpolator
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop import workers
-from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig, strip
+from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig, solved, strip
 from fabric_fenicsx.loop.kinds.bias_extension.curves import KNOTS, Curve
+from fabric_fenicsx.loop.kinds.bias_extension.phases import Phase
 from fabric_fenicsx.loop.kinds.bias_extension.strip import solved_strip, strip_case
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.rigs.bias_extension import build
@@ -159,6 +160,24 @@ def test_a_strip_that_is_held_comes_to_rest_as_the_rig_s_does(changes):
     back = time > times[2] + 0.1
     near = PchipInterpolator(path.back.travel, path.back.force)(exact["displacement_mm"][back])
     assert near == pytest.approx(force[back], abs=0.01 * force.max())
+
+
+@pytest.mark.parametrize("dashpot", [0.0, 0.05], ids=["at once", "within a moment"])
+def test_beyond_its_ends_a_strip_goes_on_as_a_line(dashpot):
+    """Also where its first steps are short, for what gives way within them."""
+    wanted = case({}, back=True)
+    path = solved_strip(wanted, replace(SOFT, dashpot=dashpot))
+    way = solved._way(path, solved._alike(path), replace(SOFT, dashpot=dashpot))
+    top = path.travel[-1]
+    D = np.array([-0.1, -0.06, -0.02, 0.9999, 1.02, 1.06]) * top
+    for phase in (Phase.OUT, Phase.BACK):
+        force = way.force(D, np.full(6, phase, dtype=np.int8), replace(SOFT, dashpot=dashpot))
+        assert np.ptp(np.diff(force[:3])) < 0.05 * np.ptp(force)
+        assert np.abs(np.diff(force)).max() < 1.2 * np.ptp(force[2:4])
+        gamma = way.at("gamma", D, np.full(6, phase, dtype=np.int8))
+        assert gamma[1] - gamma[0] == pytest.approx(gamma[2] - gamma[1], rel=1e-9)
+        beyond = way.at("gamma", top * np.array([1.02, 1.04, 1.06]), np.full(3, phase, np.int8))
+        assert beyond[1] - beyond[0] == pytest.approx(beyond[2] - beyond[1], rel=1e-9)
 
 
 def test_a_way_back_has_a_curve_of_its_own():

@@ -19,8 +19,8 @@ __all__ = ["BIAS_EXTENSION", "BiasExtensionRig", "StripRunKeys"]
 
 Array = npt.NDArray[np.float64]
 
-#: Share of the largest travel by which a crosshead that comes back may overshoot.
-OVERSHOT = 0.02
+#: Share of the largest travel by which a crosshead may come back past its start, or be read there.
+OVERSHOT = 0.1
 
 
 class BiasExtensionRig(Keys):

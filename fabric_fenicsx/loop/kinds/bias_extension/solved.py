@@ -26,7 +26,7 @@ from ...workers import each_of
 from .curves import KNOTS, Curve
 from .phases import SIGN, Phase, Phases
 from .standing import AtRest, Hold
-from .strip import STEPS, StripPath, solved_strip, strip_case
+from .strip import SOON, STEPS, StripPath, solved_strip, strip_case
 
 __all__ = [
     "GROUPS",
@@ -77,9 +77,29 @@ def polynomial(coefficients: Array, s: Array, order: int) -> Array:
 
 
 def _pieces(of: PchipInterpolator, D: Array) -> tuple[Array, Array]:
-    """See Way.cubics; the first and the last piece go on."""
-    k = np.maximum(np.minimum(np.searchsorted(of.x, D, side="right"), len(of.x) - 1) - 1, 0)
-    return of.c[:, k], D - of.x[k]
+    """See Way.cubics.
+
+    Beyond either end a line goes on: from that end or, where a way begins there and is looked at
+    closely, from where all are under way. Nearer than the next point it is its first moment yet.
+    """
+    x, last = of.x, len(of.x) - 1
+    k = np.clip(np.searchsorted(x, D, side="right") - 1, 0, last - 1)
+    pieces, on = of.c[:, k], D - x[k]
+    whole = x[last] - x[0]
+    for end, inner, beyond in (
+        (0, x[1], D < x[0]),
+        (last, x[last - 1], D > x[last]),
+    ):
+        if not beyond.any():
+            continue
+        start, first = x[end], abs(inner - x[end])
+        if first < 2.0 * SOON[0] * whole:
+            start += math.copysign(SOON[-1] * whole, inner - x[end])
+            beyond &= np.abs(D - x[end]) > first
+        pieces[:2, beyond] = 0.0
+        pieces[2:, beyond] = np.stack([of(start, 1), of(start)])[:, None]
+        on[beyond] = D[beyond] - start
+    return pieces, on
 
 
 def _slope_of(coefficients: Array, on: Array) -> tuple[Array, Array]:

@@ -41,8 +41,8 @@ Array = npt.NDArray[np.float64]
 
 #: Steps of a way out, if none fails: where others are foretold of it, and where it is itself meant.
 STEPS, FINE_STEPS = 18, 40
-#: Times of a hold that a strip is looked at, as shares of it.
-HELD = np.geomspace(1e-3, 1.0, 18)
+#: First time of a hold that a strip is looked at, as a share of it.
+HELD = 1e-3
 #: Shares of a way that a strip with dashpots or slip is looked at when it has begun: what is in
 #: series with them gives way first.
 SOON = np.array([5e-4, 1.5e-3, 4e-3, 8e-3, 1.6e-2])
@@ -323,8 +323,9 @@ class _Strip:
         # Without dashpots and slip all is as it is on the way out.
         lets_go = model.crossings.slip_limit is not None or curve.dashpot > 0.0
         standing = None
+        steps = round(out / case.solver.largest_step_s)
         if stops and lets_go:
-            stops = min(stops, round(out / case.solver.largest_step_s))
+            stops = min(stops, steps)
             planned = out * np.arange(1, stops + 1) / stops
             standing = Standing(model, case, [out * SOON[-1], *planned])
 
@@ -340,7 +341,7 @@ class _Strip:
         time, force, middle = pulled(
             model,
             case,
-            self._corners(case, curve, out, lets_go),
+            self._corners(case, curve, out, steps if lets_go else 0),
             lambda: angles.append(model.shear_angles()),
             kept,
             longest,
@@ -365,7 +366,7 @@ class _Strip:
         return path(way, speed, back, rest, hold)
 
     def _corners(
-        self, case: BiasExtensionCase, curve: Curve, out: float, lets_go: bool
+        self, case: BiasExtensionCase, curve: Curve, out: float, steps: int
     ) -> Iterator[float]:
         """Times [s] at which it is looked at beside those of its steps; lets it go back.
 
@@ -373,12 +374,13 @@ class _Strip:
             case: of the strip.
             curve: with that of the way back.
             out: when it is pulled furthest [s].
-            lets_go: whether there are dashpots or slip.
+            steps: of a way; 0 where neither dashpots nor slip change anything at corners.
         """
-        soon = out * SOON if lets_go else np.zeros(0)
+        soon = out * SOON if steps else np.zeros(0)
         yield from (*soon, out)
         if case.hold_s > 0.0:
-            yield from out + case.hold_s * (HELD if lets_go else HELD[-1:])
+            yield from out + case.hold_s * np.geomspace(HELD, 1.0, steps // 2)[:-1]
+            yield out + case.hold_s
         if case.unload:
             self._take(curve.back or curve)
             yield from (*(out + case.hold_s + soon), duration(case))
