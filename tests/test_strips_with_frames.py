@@ -15,7 +15,7 @@ from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig
 from fabric_fenicsx.loop.kinds.bias_extension.centred import CentredBiasExtension
 from fabric_fenicsx.loop.kinds.bias_extension.curves import KNOTS, Curve
 from fabric_fenicsx.loop.kinds.bias_extension.frame_law import FRAME_SHARE, foretold, in_thirds
-from fabric_fenicsx.loop.kinds.bias_extension.settling import LEFT, ROUNDS, Settling
+from fabric_fenicsx.loop.kinds.bias_extension.settling import LEFT, ROUGH, ROUNDS, Settling
 from fabric_fenicsx.loop.kinds.bias_extension.strip import solved_strip, strip_case
 from fabric_fenicsx.loop.kinds.bias_extension.with_frames import (
     held,
@@ -187,7 +187,9 @@ def test_fits_with_the_locking_of_frames_end_where_nothing_moves():
         values = {"k1_N": 0.02, "k3_N": 0.0, "c1_N_s": 0.0, FRAME_SHARE: 1.0, compliance: start}
         ends.append(search.from_there(search.at(values, {})))
     for found in ends:
-        assert found.fit.converged and found.rounds[-1].left <= LEFT < found.rounds[0].left
+        # Within LEFT, or where no way ahead makes the residual smaller and little is left.
+        assert found.fit.converged and found.rounds[-1].left <= ROUGH
+        assert found.rounds[0].left > LEFT
         assert len(found.rounds) < ROUNDS
     one, other = (found.fit for found in ends)
     free = [name for name in one.values if name not in one.at_bound]
