@@ -257,6 +257,7 @@ def test_a_rank_sees_its_part_of_the_whole():
             np.testing.assert_allclose(
                 getattr(found, name), getattr(expected, name), atol=1e-6 * size, err_msg=name
             )
+    np.testing.assert_array_equal(model.axes_angles(), whole.shear_angle)
 
 
 @pytest.mark.mpi
