@@ -331,7 +331,9 @@ class Judge:
         allowed = CRITERIA.roughly if roughly else CRITERIA.scatter
         # Held-out readings are compared with a noise that few others may be all that is known of.
         limit = max(allowed, self._by_chance(model, count, of_others=bool(out.any())))
-        return bool(error * self._as_stated(noise) <= limit * self.misfit(model).reading)
+        # Noise of somewhat more than was stated is as stated; of less it makes no error larger.
+        held_out = error * min(noise, self._as_stated(noise))
+        return bool(held_out <= limit * self.misfit(model).reading)
 
     def _known_of(self, model: Model) -> list[str]:
         """Parameters of terms without a formula, which have to be known where they foretell."""
