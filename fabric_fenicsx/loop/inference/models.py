@@ -419,8 +419,8 @@ class Models:
     def _nearest_now(self, found: Sequence[Fit]) -> list[Fit]:
         """Of some fits the nearest ones, with noise as it is taken to be now; one of each form."""
         sizes: dict[tuple[Variant, ...], tuple[float, Fit]] = {}
-        for one in found:
-            size = self.left_by(one) + self.judge.cost(one, self.effects_of(one))
+        for one, left in zip(found, self.left_by(found), strict=True):
+            size = left + self.judge.cost(one, self.effects_of(one))
             known = sizes.get(one.variants)
             if not nothing_left(one) and (known is None or size < known[0]):
                 sizes[one.variants] = (size, one)
@@ -433,11 +433,11 @@ class Models:
                 taken.append(one)
         return taken
 
-    def left_by(self, model: Fit) -> float:
-        """Size of what a model leaves, with noise as it is taken to be now; see soft_size."""
+    def left_by(self, models: Sequence[Fit]) -> list[float]:
+        """Size of what each model leaves, with noise as it is taken to be now; see soft_size."""
         rows = self.judge.rows
-        white = self.variances.noise.whitener(self.experiment.readings, rows)(model.residual[rows])
-        return soft_size(white, CRITERIA.far) + model.penalty
+        whiten = self.variances.noise.whitener(self.experiment.readings, rows)
+        return [soft_size(whiten(m.residual[rows]), CRITERIA.far) + m.penalty for m in models]
 
     def _each_again(
         self, models: Sequence[tuple[Fit, Variances]], robust: float | None = None

@@ -397,7 +397,7 @@ class Search:
         """Whether a fitted model leaves far more than the rival, with noise as it is known now."""
         if self._rival is None:
             return False
-        mine, its = (self.models.left_by(one) for one in (model, self._rival))
+        mine, its = self.models.left_by([model, self._rival])
         return mine > CRITERIA.second_start * its
 
     def _screened(self) -> Screen:
