@@ -13,7 +13,8 @@ from measurements.sets import sixty
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
-from fabric_fenicsx.loop.inference.fitting import _uncertainty, fit
+from fabric_fenicsx.loop.inference.fitted import uncertainty
+from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.validation import cross_validated, parts_by
@@ -351,6 +352,6 @@ def test_errors_where_divide_and_conquer_does_not_converge():
     """Of columns of specimens that are all but alike, which LAPACK's dsyevd gives up on."""
     information = np.load(Path(__file__).parent / "data" / "information.npy")
     J = np.linalg.cholesky(information).T
-    std, _, root = _uncertainty(J)
+    std, _, root = uncertainty(J)
     np.testing.assert_allclose(root @ root.T, np.linalg.inv(information), rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(std, np.sqrt(np.linalg.inv(information).diagonal()), rtol=1e-6)

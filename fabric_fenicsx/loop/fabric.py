@@ -28,7 +28,7 @@ from ..rigs.fabric_file import FILE, SCHEMA, FabricFile
 from .inference.curve import Curve
 from .inference.diagnosis import Diagnosis
 from .inference.effects import Effect, Variant
-from .inference.fitting import Fit
+from .inference.fitted import Fit
 from .measurement.schema import Measurement
 from .report.content import nearest_model, scatter
 from .report.plausibility import correlation_of

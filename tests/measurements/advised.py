@@ -26,7 +26,8 @@ from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.inference.effects import Variant
 from fabric_fenicsx.loop.inference.experiment import Experiment
 from fabric_fenicsx.loop.inference.first_order import signatures
-from fabric_fenicsx.loop.inference.fitting import Fit, fit
+from fabric_fenicsx.loop.inference.fitted import Fit
+from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.next_tests import NextTest, next_tests
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.starts import fit_combinations

@@ -9,7 +9,7 @@ from ...errors import SolveError
 from .effects import Effect, Variant
 from .experiment import Experiment, each_by_itself
 from .first_order import Combination, Signature, signatures
-from .fitting import Fit
+from .fitted import Fit
 from .screen import Signatures
 
 __all__ = ["by_itself", "forms_beside", "signed"]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from .criteria import CRITERIA
 from .diagnosis import Verdict
 from .effects import Effect
-from .fitting import Fit
+from .fitted import Fit
 from .judge import Judge, Model
 
 __all__ = ["chosen_model", "in_place_of", "models_instead", "verdict_on"]

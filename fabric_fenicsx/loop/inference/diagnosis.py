@@ -12,7 +12,7 @@ import numpy.typing as npt
 from .curve import Curve
 from .effects import Effect
 from .experiment import Experiment
-from .fitting import Fit
+from .fitted import Fit
 from .noise import Noise, Whiteness
 from .validation import Laboratory
 

@@ -13,7 +13,8 @@ from scipy.optimize import lsq_linear
 from ...errors import SolveError
 from .effects import Parameter, Variant
 from .experiment import Experiment
-from .fitting import Fit, linearised, orthogonal_to, parameters_of, soft_size
+from .fitted import Fit, soft_size
+from .fitting import linearised, orthogonal_to, parameters_of
 from .variances import Variances
 
 __all__ = [

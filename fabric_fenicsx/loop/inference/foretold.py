@@ -19,7 +19,8 @@ from scipy.optimize import least_squares, lsq_linear
 from ...errors import SolveError
 from .effects import of_first, of_the_first
 from .experiment import Experiment
-from .fitting import Fit, parameters_of
+from .fitted import Fit
+from .fitting import parameters_of
 
 __all__ = ["Foretold", "Known", "Nearest"]
 

@@ -23,7 +23,8 @@ from scipy.stats import f as f_ratio
 from .criteria import CRITERIA
 from .effects import Effect, Variant
 from .experiment import Experiment
-from .fitting import Fit, groups_of, linearised
+from .fitted import Fit
+from .fitting import groups_of, linearised
 from .noise import Noise, Whiteness, missed_readings, outliers, whiteness
 from .validation import CrossValidation, cross_validated, parts_by, stretches
 from .variances import (

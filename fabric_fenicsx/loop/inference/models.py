@@ -14,7 +14,8 @@ from .criteria import CRITERIA
 from .effects import Effect, Variant
 from .experiment import Experiment, each_by_itself
 from .first_order import Combination, Signature, ToFirstOrder
-from .fitting import Fit, fit, parameters_of, soft_size
+from .fitted import Fit, soft_size
+from .fitting import fit, parameters_of
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise
 from .ranking import cancelling, nearest_forms, nothing_left, simplest_first

@@ -32,7 +32,7 @@ from ..measurement.kind import Kind
 from ..measurement.proposal import Proposal
 from ..measurement.schema import Measurement
 from .experiment import Experiment
-from .fitting import Fit
+from .fitted import Fit
 from .foretold import Foretold, Known
 
 __all__ = ["NextTest", "best_tests", "next_tests", "next_tests_report"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .diagnosis import Beside
 from .experiment import Another
-from .fitting import Fit
+from .fitted import Fit
 from .judge import Judge
 from .validation import has_own
 

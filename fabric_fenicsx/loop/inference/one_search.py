@@ -23,7 +23,8 @@ from .diagnosis import Candidate, Diagnosis, Verdict
 from .effects import Effect, Variant
 from .experiment import Experiment
 from .first_order import Combination, ToFirstOrder
-from .fitting import Fit, fit
+from .fitted import Fit
+from .fitting import fit
 from .judge import Model
 from .models import Models
 from .noise import quantum

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .experiment import Readings
-from .fitting import Fit
+from .fitted import Fit
 from .noise import Noise
 
 __all__ = ["Check", "predictive_check"]

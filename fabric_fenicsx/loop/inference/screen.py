@@ -24,7 +24,7 @@ from scipy.stats import chi2
 from ..copies import in_copies
 from .effects import Effect, Variant
 from .first_order import Combination, Signature, ToFirstOrder
-from .fitting import Fit
+from .fitted import Fit
 
 __all__ = ["Screen", "Signatures"]
 

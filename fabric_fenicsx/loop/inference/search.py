@@ -18,7 +18,7 @@ from .criteria import CRITERIA
 from .diagnosis import Diagnosis
 from .effects import Effect
 from .experiment import Experiment
-from .fitting import Fit
+from .fitted import Fit
 from .judge import Model
 from .one_search import Search
 from .ranking import nearest_forms

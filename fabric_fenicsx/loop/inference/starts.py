@@ -12,7 +12,8 @@ from .criteria import CRITERIA
 from .effects import Parameter, Variant
 from .experiment import Experiment, each_by_itself
 from .first_order import SMALL, Combination, Signature, Start, ToFirstOrder, bounded_step, cost_of
-from .fitting import Fit, fit, parameters_of, soft_size
+from .fitted import Fit, soft_size
+from .fitting import fit, parameters_of
 from .variances import Variances
 
 __all__ = ["around_jumps", "fit_combinations"]

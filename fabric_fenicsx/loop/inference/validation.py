@@ -12,7 +12,8 @@ from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Parameter, Variant
 from .experiment import Experiment, Readings
-from .fitting import Fit, fit
+from .fitted import Fit
+from .fitting import fit
 
 __all__ = [
     "CrossValidation",

@@ -16,7 +16,8 @@ from ...output.page import finite
 from ..inference.criteria import CRITERIA
 from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Effect, Parameter, Variant
-from ..inference.fitting import Fit, parameters_of
+from ..inference.fitted import Fit
+from ..inference.fitting import parameters_of
 from ..inference.next_tests import NextTest, next_tests_report
 from ..inference.predictive_check import Check, predictive_check
 from ..inference.validation import has_own

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Variant
-from ..inference.fitting import Fit
+from ..inference.fitted import Fit
 from .discovered import Discovered, names_of
 from .drawing import AFTER, FAINT, blank, legend, quantity_label
 from .residuals import residual_points

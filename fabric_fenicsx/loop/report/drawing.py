@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..inference.diagnosis import Diagnosis
-from ..inference.fitting import Fit
+from ..inference.fitted import Fit
 from ..kinds import KINDS
 from .content import nearest_model
 

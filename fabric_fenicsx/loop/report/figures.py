@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from ..inference.diagnosis import Diagnosis
 from ..inference.experiment import Another
-from ..inference.fitting import Fit
+from ..inference.fitted import Fit
 from ..kinds import kind_of
 from .content import nearest_model
 from .drawing import (

@@ -6,7 +6,7 @@ import pandas as pd
 
 from ..inference.curve import Curve
 from ..inference.diagnosis import Diagnosis
-from ..inference.fitting import Fit
+from ..inference.fitted import Fit
 
 __all__ = ["curve_table", "law_table"]
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from ..inference.criteria import CRITERIA
 from ..inference.diagnosis import Diagnosis
-from ..inference.fitting import Fit
+from ..inference.fitted import Fit
 from .words import parameter_unit
 
 __all__ = ["correlation_of", "correlations", "doubts"]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, StrMethodFormatter
 
 from ..inference.diagnosis import Diagnosis
-from ..inference.fitting import Fit
+from ..inference.fitted import Fit
 from ..kinds import kind_of
 from .content import nearest_model
 from .drawing import (

@@ -23,7 +23,8 @@ import numpy.typing as npt
 from ....errors import SolveError
 from ...inference.diagnosis import Round
 from ...inference.effects import Variant
-from ...inference.fitting import Fit, fit, groups_of
+from ...inference.fitted import Fit
+from ...inference.fitting import fit, groups_of
 from ...inference.judge import Judge
 from ...inference.validation import parts_by
 from ...inference.variances import Variances

@@ -25,7 +25,8 @@ from ....errors import SolveError
 from ...inference.criteria import CRITERIA
 from ...inference.diagnosis import Diagnosis, Joined
 from ...inference.effects import Effect, Variant
-from ...inference.fitting import Fit, groups_of
+from ...inference.fitted import Fit
+from ...inference.fitting import groups_of
 from ...inference.judge import Judge
 from ...inference.ranking import nothing_left
 from ...inference.variances import Variances
