@@ -23,11 +23,11 @@ from fabric_fenicsx.loop.kinds.bias_extension.mixture import Travels
 from fabric_fenicsx.loop.kinds.bias_extension.model import OFTEN, SELDOM, BiasExtension
 from fabric_fenicsx.loop.kinds.bias_extension.phases import backward, phases_of, since_stop
 from fabric_fenicsx.loop.kinds.bias_extension.quantities import read_together
-from fabric_fenicsx.loop.kinds.bias_extension.solved import Way
 from fabric_fenicsx.loop.kinds.bias_extension.strip import (
     solved_strip,
     strip_case,
 )
+from fabric_fenicsx.loop.kinds.bias_extension.ways import Way
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.rigs.bias_extension import BiasExtensionCase
 from fabric_fenicsx.rigs.fabric_file import FabricFile, with_fabric

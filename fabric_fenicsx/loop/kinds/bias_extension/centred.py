@@ -27,8 +27,9 @@ from ...inference.effects import Variant
 from ...inference.experiment import NO_DEVIATIONS, Deviations
 from .mixture import Part, number
 from .model import BiasExtension
-from .solved import Solved, Wanted, Way
+from .solved import Solved, Wanted
 from .strip_models import changes_of, pulled, solved_by
+from .ways import Way
 
 __all__ = ["CentredBiasExtension"]
 

@@ -11,7 +11,7 @@ from ...expressions.marching import Varying
 from ..records import one_point_before
 from .even_shear import SHARES, ZONES, EvenZones, beside, in_zones
 from .mixture import Part, Travels, of_groups
-from .solved import GROUPS
+from .ways import GROUPS
 
 __all__ = ["columns_of", "gone"]
 

@@ -14,7 +14,8 @@ import numpy.typing as npt
 from ...expressions.marching import Varying
 from ...kept import Kept
 from .phases import Parted, Phase
-from .solved import GROUPS, Name, Solved, polynomial
+from .solved import Solved
+from .ways import GROUPS, Name, polynomial
 
 __all__ = ["Holds", "Part", "Travels", "number", "of_groups", "of_ways"]
 

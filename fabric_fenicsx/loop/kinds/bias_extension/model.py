@@ -42,10 +42,11 @@ from .mixture import Holds, Part, Travels, number, of_ways
 from .phases import GONE_BACK, Phase, backward, moving, parted, phases_of, since_stop, speed_out
 from .quantities import coarser, first_curve, read_together, strip_of
 from .settled import Quantity
-from .solved import GROUPS, Solved, SolvedStrips
+from .solved import Solved, SolvedStrips
 from .strip import strip_case
 from .strip_models import StripModels, WaysOut
 from .terms import strip_terms
+from .ways import GROUPS
 
 __all__ = ["BiasExtension"]
 
