@@ -428,7 +428,7 @@ def test_the_best_effect_is_tried_in_its_other_forms():
         replace(found[2], white=1.5 * found[2].white),
         found[1],
     ]
-    others = search._other_forms(found[0])
+    others = search.several._other_forms(found[0])
     assert [one.variants[0].label for one in others] == ["two"] and others[0] is found[1]
 
 

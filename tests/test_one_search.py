@@ -9,7 +9,7 @@ from linear import Linear, linear_effect, readings
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.inputs.parameters import Parameter
-from fabric_fenicsx.loop.inference import one_search
+from fabric_fenicsx.loop.inference import one_search, several
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
 from fabric_fenicsx.loop.inference.fitting import fit
@@ -18,6 +18,7 @@ from fabric_fenicsx.loop.inference.models import Models
 from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.one_search import Search
 from fabric_fenicsx.loop.inference.search import _alike, _to_be_parted, diagnose_test
+from fabric_fenicsx.loop.inference.several import Several
 from fabric_fenicsx.loop.inference.variances import Variances
 
 RUNS, EACH = 4, 150
@@ -163,7 +164,7 @@ def test_beside_what_wins_as_a_rival_others_are_tried(monkeypatch):
         start = {"a": 10.0, "b": 2.0} | {e.name: 0.1 for e in effects}
         return own.models.weighed([fit(test, forms, start, test.readings.fit, Variances(NOISE))])[0]
 
-    own._added_beside.clear()
+    own.several._added_beside.clear()
     levels = [[model()], [model(wave), model(kink)], [model(wave, ripple)]]
     rival = model(kink, ripple)
     assert rival.criterion < levels[2][0].criterion - 100.0
@@ -338,9 +339,9 @@ def test_a_term_is_looked_for_before_several_effects_with_names(
     test = made(columns, lambda t: size * columns["kink"](t), [linear_effect(n) for n in names])
     test.terms, test.terms_are_rivals = [linear_effect("kink", acts_on="reading")], are_rivals
     together = []
-    own = Search._together
+    own = Several._together
     monkeypatch.setattr(
-        Search, "_together", lambda self, *a: together.append(self.effects) or own(self, *a)
+        Several, "_together", lambda self, *a: together.append(self.effects) or own(self, *a)
     )
     found = diagnose_test(test)
     assert [e.name for e in found.effects] == ["kink"]
@@ -358,9 +359,9 @@ def test_a_term_that_leaves_doubtful_noise_is_not_all(monkeypatch, doubtful):
     test = made(columns, columns["kink"], [linear_effect(n) for n in names])
     test.terms = [linear_effect(n, acts_on="reading") for n in ("kink", "hum")]
     together = []
-    own = Search._together
+    own = Several._together
     monkeypatch.setattr(
-        Search, "_together", lambda self, *a: together.append(self.effects) or own(self, *a)
+        Several, "_together", lambda self, *a: together.append(self.effects) or own(self, *a)
     )
     monkeypatch.setattr(Judge, "doubtful_noise", lambda self, model: doubtful)
     found = diagnose_test(test)
@@ -379,7 +380,7 @@ def test_more_is_added_to_the_next_term_of_one_variable_as_well():
     test = made({"kink": lambda t: t**2}, lambda t: 3.0 * t**2, [linear_effect("kink")])
     own = search(test)
     own.models.with_these_variances = lambda model: model
-    assert own._other_effects([best, of_two, same, other]) == [other]
+    assert own.several._other_effects([best, of_two, same, other]) == [other]
 
 
 @pytest.mark.parametrize(
@@ -398,7 +399,7 @@ def test_specimens_that_differ_in_their_own_way_do_not_hide_a_term(own_way, verd
 
 
 @pytest.mark.parametrize(
-    ("several", "alike"),
+    ("names", "alike"),
     [
         (("law", "curl"), True),
         (("bend", "law"), False),
@@ -406,11 +407,11 @@ def test_specimens_that_differ_in_their_own_way_do_not_hide_a_term(own_way, verd
         (("law", "warm"), False),
     ],
 )
-def test_general_forms_of_effects_with_names_are_no_other_effects(several, alike):
+def test_general_forms_of_effects_with_names_are_no_other_effects(names, alike):
     law = replace(linear_effect("law", acts_on="bending_moment"), general_form_of=("bend",))
     known = {name: linear_effect(name) for name in ("bend", "curl", "warm")} | {"law": law}
     named = [known["bend"], known["curl"]]
-    assert _alike([known[name] for name in several], named) is alike
+    assert _alike([known[name] for name in names], named) is alike
 
 
 def test_a_model_that_was_fitted_badly_alone_is_fitted_from_what_it_is_with_others():
@@ -418,9 +419,9 @@ def test_a_model_that_was_fitted_badly_alone_is_fitted_from_what_it_is_with_othe
     own = of_two_bends()
     alone = next(m for m in own.singles if m.effects == (own.effects[0],))
     astray = replace(alone, fit=replace(alone.fit, residual=2.0 * alone.fit.residual))
-    assert one_search._is_new(alone.fit, [astray])
-    assert not one_search._is_new(alone.fit, [alone])
-    assert one_search._is_new(alone.fit, [])
+    assert several._is_new(alone.fit, [astray])
+    assert not several._is_new(alone.fit, [alone])
+    assert several._is_new(alone.fit, [])
     # With another effect, of which nothing is left, it is where it should be.
     both = own.judge.weighed(
         fit(
@@ -433,7 +434,7 @@ def test_a_model_that_was_fitted_badly_alone_is_fitted_from_what_it_is_with_othe
         tuple(own.effects),
     )
     levels = [[], [replace(astray, criterion=alone.criterion + 1e3)], [both]]
-    own._with_one_less(levels)
+    own.several.with_one_less(levels)
     (best, *_) = [m for m in levels[1] if m.effects == alone.effects]
     assert best.criterion == pytest.approx(alone.criterion, abs=1.0)
 

@@ -16,10 +16,11 @@ from scipy.interpolate import PchipInterpolator
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.loop import workers
-from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig, solved, strip
+from fabric_fenicsx.loop.kinds.bias_extension import BiasExtensionRig, strip
 from fabric_fenicsx.loop.kinds.bias_extension.curves import KNOTS, Curve
 from fabric_fenicsx.loop.kinds.bias_extension.phases import Phase
 from fabric_fenicsx.loop.kinds.bias_extension.strip import solved_strip, strip_case
+from fabric_fenicsx.loop.kinds.bias_extension.ways import alike, way_of
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.rigs.bias_extension import build
 
@@ -167,7 +168,7 @@ def test_beyond_its_ends_a_strip_goes_on_as_a_line(dashpot):
     """Also where its first steps are short, for what gives way within them."""
     wanted = case({}, back=True)
     path = solved_strip(wanted, replace(SOFT, dashpot=dashpot))
-    way = solved._way(path, solved._alike(path), replace(SOFT, dashpot=dashpot))
+    way = way_of(path, alike(path), replace(SOFT, dashpot=dashpot))
     top = path.travel[-1]
     D = np.array([-0.1, -0.06, -0.02, 0.9999, 1.02, 1.06]) * top
     for phase in (Phase.OUT, Phase.BACK):
