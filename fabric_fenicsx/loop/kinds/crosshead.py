@@ -4,8 +4,6 @@ Of every crossing that stands for others the angle goes by the crosshead's place
 moment per area of fabric, from the virtual work F dD = Σ A m dγ,
 
     F = Σ A dγ/dD m(γ, γ̇, ...)
-
-The laws are those of mechanics.laws, the same classes that a whole net takes.
 """
 
 from __future__ import annotations
@@ -22,31 +20,23 @@ import numpy.typing as npt
 from scipy.optimize import nnls
 
 from ...inputs.parameters import Parameter
-from ...mechanics.laws.dashpots import LinearDashpot
-from ...mechanics.laws.springs import PolynomialSpring
-from ..expressions.marching import MOST_KEPT, Marched, Varying, spread
+from ..expressions.marching import Marched, Varying, spread
 from ..inference.effects import Effect, Variant, of_each, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ..inference.noise import estimated_noise
-from ..kept import Kept
 from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
+from .crossing_moments import BASELINE, CrossingMoments
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
 from .recorded_rig import RecordedRig
-from .records import of_a_crossing, runs_before, typical
+from .records import runs_before, typical
 from .slipping import Slips
 
-__all__ = ["BASELINE", "CrossheadTest"]
+__all__ = ["CrossheadTest"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
-
-BASELINE = (
-    Parameter("k1_N", (0.0,), 0.0, meaning="spring, moment per area and angle"),
-    Parameter("k3_N", (0.0,), 0.0, meaning="spring, moment per area and angle³"),
-    Parameter("c1_N_s", (0.0,), 0.0, meaning="dashpot, moment per area and rate"),
-)
 
 #: Share of the largest size below which a reading on the other side of 0 is none.
 LITTLE = 0.05
@@ -82,12 +72,16 @@ class CrossheadTest:
         runs = [(m, run) for m in measurements for run in m.runs]
         motions = [self._motion(m, run) for m, run in runs]
         self._compiled: dict[Any, Marched] = {} if like is None else like._compiled
-        #: Angles and rates of a rig that follows the crosshead, and the moments last made of them.
+        #: Angles and rates of a rig that follows the crosshead.
         self._still: dict[str, Varying] | None = None
-        self._kept_moments: Kept[Varying] = Kept(MOST_KEPT)
         self._slips = Slips()
         self._recorded = RecordedRig(motions, self._compiled)
         self._points = self._recorded.points
+        self._moments = CrossingMoments(
+            self._compiled,
+            self._from_earlier_runs,
+            lambda: self._recorded.each(self._before["specimen"]),
+        )
         self._set_up(runs)
         known = self._kinematics(self._points, {})
         gamma, rate = (self._shown(known[key].value) for key in ("gamma", "rate"))
@@ -247,18 +241,8 @@ class CrossheadTest:
             else:
                 found = self._recorded.added(variant, "variable", whole, values)
             return self._recorded.at_readings(found.value)
-        key = (variant.like or variant, "along")
-        if key not in self._compiled:
-            names = tuple(p.name for p in variant.parameters) + variant.of_baseline
-            marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
-            law = variant.laws(marched.at)[0]
-            crossing = of_a_crossing(marched, 0)
-            history = {f"0 {n}": value for n, value in law.history(crossing).items()}
-            variable = law.variable_at(crossing)
-            self._compiled[key] = marched.define({"variable": variable}, history)
-        known, first = self._kinematics(self._points, {}), self._from_earlier_runs(variant)
-        variables = self._compiled[key](known, values, first)
-        return self._shown(variables["variable"].value)
+        variable = self._moments.variable(variant, self._kinematics(self._points, {}), values)
+        return self._shown(variable.value)
 
     def _ranges(self) -> dict[str, float]:
         """Largest values in the fitted readings of what terms without a formula depend on.
@@ -420,10 +404,11 @@ class CrossheadTest:
             by: derivatives that are wanted; by default all there are.
         """
         known = self._kinematics(travel, values)
-        moment = self._moment(None, known, values, self._counts)
+        again = known is self._still
+        moment = self._moments.of(None, known, values, self._counts, again=again)
         for v in variants:
             if v.laws is not None:
-                moment += self._moment(v, known, values, self._counts)
+                moment += self._moments.of(v, known, values, self._counts, again=again)
         factor = known["factor"]
         if by is not None:
             moment, factor = (
@@ -436,82 +421,9 @@ class CrossheadTest:
             {p: self._gathered(spread(slope, shape)) for p, slope in work.slopes.items()},
         )
 
-    def _moment(
-        self,
-        variant: FrameVariant | None,
-        known: dict[str, Varying],
-        values: Mapping[str, float],
-        count: Array | None = None,
-    ) -> Varying:
-        """Moment per area [N] of the baseline or of an effect.
-
-        Args:
-            variant: the effect's form; None: the baseline's.
-            known: what the laws go by at each point of each record.
-            values: of the parameters.
-            count: points of each record that are asked for; by default all.
-        """
-        key = ((variant.like or variant) if variant is not None else None, "moment")
-        if key not in self._compiled:
-            parameters = BASELINE if variant is None else variant.parameters
-            names = tuple(p.name for p in parameters)
-            names += () if variant is None else variant.of_baseline
-            marched = Marched(("gamma", "gamma_n", "rate", "per_time"), names)
-            p = marched.at
-            if variant is None:
-                laws: tuple[Any, ...] = (
-                    PolynomialSpring(k1=p["k1_N"], k3=p["k3_N"]),
-                    LinearDashpot(p["c1_N_s"]),
-                )
-            else:
-                assert variant.laws is not None
-                laws = variant.laws(p)
-            moment: Any = 0.0
-            history: dict[str, Any] = {}
-            for k, law in enumerate(laws):
-                crossing = of_a_crossing(marched, k)
-                moment = moment + law.moment(crossing)
-                history |= {f"{k} {n}": value for n, value in law.history(crossing).items()}
-            self._compiled[key] = marched.define({"moment": moment}, history)
-        if known is not self._still:
-            return self._made_moment(variant, key, known, values, count)
-        # Beside each of many effects the same model again: its moments are known.
-        own = BASELINE if variant is None else variant.parameters
-        of_baseline = () if variant is None else variant.of_baseline
-        numbers = tuple(values[name] for name in (*(p.name for p in own), *of_baseline))
-        return self._kept_moments(
-            variant, (known, numbers), lambda: self._made_moment(variant, key, known, values, count)
-        )
-
-    def _made_moment(
-        self,
-        variant: FrameVariant | None,
-        key: Any,
-        known: dict[str, Varying],
-        values: Mapping[str, float],
-        count: Array | None,
-    ) -> Varying:
-        """The same from its compiled expressions."""
-        first = {} if variant is None else self._from_earlier_runs(variant)
-        moment = self._compiled[key](known, values, first, count)["moment"]
-        if variant is None or variant.by_run is None:
-            return moment
-        return moment * self._by_run(variant, values)
-
     def _from_earlier_runs(self, variant: FrameVariant) -> dict[str, Array]:
         """What a form's law remembers where a run begins, by name; see Marched."""
         return {}
-
-    def _by_run(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
-        """The factor of a form's moments that goes by the run."""
-        key = (variant, "by run")
-        if key not in self._compiled:
-            assert variant.by_run is not None
-            marched = Marched(("run",), tuple(p.name for p in variant.parameters))
-            factor = variant.by_run(marched.at, marched.at["run"])
-            self._compiled[key] = marched.define({"factor": factor}, {})
-        run = self._recorded.each(self._before["specimen"])
-        return self._compiled[key]({"run": run}, values)["factor"]
 
     def _with_runs(self, effect: Effect) -> Effect:
         """Parameters of their own for each run that is fitted, where a form wants them."""

@@ -384,7 +384,7 @@ class BiasExtension(CrossheadTest):
         def total(known: dict[str, Varying]) -> Varying:
             found = number(0.0)
             for v in forms:
-                found += self._moment(v, known, values)
+                found += self._moments.of(v, known, values)
             return found
 
         return total

@@ -19,7 +19,7 @@ from ...expressions.marching import Varying
 from ...inference.effects import Variant
 from ...inference.first_order import SMALL
 from ...kept import Kept
-from ..crosshead import BASELINE
+from ..crossing_moments import BASELINE
 from ..drape.shear_field import hermite_weights
 from ..picture_frame.variant import FrameVariant
 from .curves import Curve, Moment, at_knots
