@@ -180,14 +180,14 @@ def test_what_is_left_of_nothing_is_in_no_model_of_several(tmp_path, monkeypatch
     test = PictureFrame([read_measurement(tmp_path / "set")])
     names = ("crossover_friction", "shear_locking")
     search = Search(test, [e for e in test.effects if e.name in names], lambda done, what: None)
-    fitted = search._together
+    fitted = search.several._together
 
     def with_others(*of):
         """Its models, and after them each with nothing left of its last effect."""
         models = fitted(*of)
         return [*models, *map(emptied, models)]
 
-    monkeypatch.setattr(search, "_together", with_others)
+    monkeypatch.setattr(search.several, "_together", with_others)
     _, levels = search._looked_through()
     pairs = levels[2]
     assert pairs and not any(nothing_left(model.fit) for model in pairs)

@@ -27,13 +27,15 @@ from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Parameter, Variant, of_each, scaled
 from ...inference.experiment import NO_DEVIATIONS, Deviations, Law
-from ...measurement.readings import common_noise, readings_of, specimens_of
+from ...measurement.readings import common_noise, readings_of
 from ...measurement.schema import Measurement
-from ..records import FEWEST_BEFORE, earlier_alike, last_run
+from ..records import last_run
 from .compared import HungStrips, expected_heights, places_on
 from .each_specimen import EachSpecimen, names_of
 from .effects import CANTILEVER_EFFECTS
-from .hanging import HangingTows, Laws, Shapes, Tow, sum_of
+from .first_stiffness import first_C1
+from .hanging import Laws, Shapes, sum_of
+from .laid_out import laid_out
 from .measured_line import scatter_of_x, smooth_line
 from .terms import terms
 from .variant import StripVariant
@@ -42,8 +44,6 @@ __all__ = ["Cantilever"]
 
 Array = npt.NDArray[np.float64]
 
-#: Loads w L³/B of the longest strip at which a start for C1 is looked for.
-LOADS = np.logspace(-2.0, 3.0, 51)
 #: C1 is looked for within this factor of its start.
 REACH = 1e3
 #: Steepest slope, as a tangent, at which a distance along the normal stands for a height.
@@ -105,12 +105,18 @@ class Cantilever:
         like: Cantilever | None = None,
     ) -> None:
         self.noise = common_noise(measurements)
-        self._lay_out(measurements)
+        found = laid_out(measurements)
+        self._strips, self._run, self._before = found.strips, found.run, found.before
+        self._length, self._arc = found.length, found.arc
+        self._distance, self._observed = found.distance, found.observed
         self._compiled: dict[tuple[Any, ...], Marched] = {} if like is None else like._compiled
         slope, self.scatter = self._measured_slopes()
         unknown = np.isnan(self._arc)
         self._steepness = np.where(unknown, np.minimum(np.abs(np.tan(slope)), STEEPEST), 0.0)
-        start = self._start() if like is None else like.baseline[0].starts[0]
+        if like is None:
+            start = first_C1(self._strips, self._steepness)
+        else:
+            (start,) = like.baseline[0].starts
         self.stiffness_per_C1 = float(self._strips[0].tows.stiffness_per_C1[0, 0])
         self.baseline: tuple[Parameter, ...] = (
             Parameter(
@@ -187,93 +193,6 @@ class Cantilever:
         """Runs and specimens of the fitted readings, counted from 0."""
         rows = self.readings.fit
         return np.unique(self._run[rows]).tolist(), np.unique(self.readings.specimen[rows]).tolist()
-
-    def _lay_out(self, measurements: Sequence[Measurement]) -> None:
-        """Readings in the order of runs, in a run by length and along the strip."""
-        table: list[Array] = []
-        run_of: list[npt.NDArray[np.int64]] = []
-        keys: list[tuple[bool, int, Tow]] = []
-        specimens = specimens_of(measurements)
-        number = 0
-        # Runs that nothing can be told by share their strips.
-        many = {s for s in specimens if list(specimens).count(s) > FEWEST_BEFORE}
-        self._before = [
-            n if s in many else 0 for n, s in zip(earlier_alike(specimens), specimens, strict=True)
-        ]
-        for m in measurements:
-            tow, spacing = m.fabric.tow, m.fabric.tow_spacing_mm
-            # kg/m² is 1e-9 tonne/mm².
-            weight = m.fabric.areal_density_kg_m2 * 1e-9 * m.rig.gravity_mm_s2
-            for run in m.runs:
-                c = run.columns
-                along = np.where(np.isnan(c["s_mm"]), np.hypot(c["x_mm"], c["z_mm"]), c["s_mm"])
-                order = np.lexsort([along, c["length_mm"]])
-                columns = [c[n][order] for n in ("length_mm", "s_mm", "x_mm", "z_mm")]
-                table.append(np.stack(columns))
-                run_of.append(np.full(run.count, number, dtype=np.int64))
-                rest = (tow.width_mm, tow.height_mm, spacing, weight, self._before[number])
-                own = specimens[number]
-                keys += [(m.rig.upside_down, own, Tow(float(L), *rest)) for L in columns[0]]
-                number += 1
-        self._length, self._arc, self._distance, self._observed = np.concatenate(table, axis=1)
-        self._run = np.concatenate(run_of)
-        self._strips = [
-            self._hung(keys, turned) for turned in dict.fromkeys(key[0] for key in keys)
-        ]
-
-    def _hung(self, keys: Sequence[tuple[bool, int, Tow]], turned: bool) -> HungStrips:
-        """The strips that are upside down, or the others, of every reading's key."""
-        rows = np.array([i for i, key in enumerate(keys) if key[0] == turned])
-        own = list(dict.fromkeys(keys[i] for i in rows))
-        number = {key: k for k, key in enumerate(own)}
-        return HungStrips(
-            HangingTows([tow for *_, tow in own]),
-            np.array([specimen for _, specimen, _ in own]),
-            turned,
-            rows,
-            np.array([number[keys[i]] for i in rows]),
-            self._run[rows],
-            self._arc[rows],
-            self._distance[rows],
-            self._observed[rows],
-        )
-
-    # Start --------------------------------------------------------------------------------
-
-    def _start(self) -> float:
-        """C1 whose strips, the linear ones in a straight clamp, come nearest to the readings.
-
-        In units of its length such a strip depends on w L³/B alone, but for a stretch of no
-        account: one strip that softens step by step gives them all.
-        """
-        every = [
-            (load, tow)
-            for own in self._strips
-            for load, tow in zip(own.tows.load_per_C1[:, 0].tolist(), own.tows.tows, strict=True)
-        ]
-        load_per_C1, tow = max(every, key=lambda one: one[0])
-        longest = HangingTows([tow])
-        lines = []
-        for load in LOADS:
-            try:
-                shape = longest.solve({"C1_MPa": load_per_C1 / load}, slopes=False)
-            except SolveError:
-                break
-            lines.append(np.concatenate([shape.x, shape.z]) / tow.length)
-        if not lines:
-            raise SolveError(f"a strip of {tow.length:g} mm does not hang at any stiffness")
-        loads, table = LOADS[: len(lines)], np.array(lines)
-        misses = []
-        for load in loads:
-            total = 0.0
-            for own in self._strips:
-                shares = own.tows.load_per_C1[:, 0] / load_per_C1
-                each = [_between(np.log(loads), table, np.log(load * share)) for share in shares]
-                x, z = np.stack(each, axis=1) * own.tows.arc[:, -1:]
-                heights, _ = expected_heights(own, self._steepness, x, z, {})
-                total += float(np.abs(own.z - heights).sum())
-            misses.append(total)
-        return float(load_per_C1 / loads[int(np.argmin(misses))])
 
     def _measured_slopes(self) -> tuple[Array, float]:
         """Slope of the measured lines at each reading [rad], and r of the module's docstring."""
@@ -500,12 +419,3 @@ class Cantilever:
             for name in {**x.slopes, **z.slopes}
         }
         return x.value, z.value, slopes
-
-
-def _between(at: Array, table: Array, where: float) -> Array:
-    """Linear between the rows of a table at increasing places, the end ones beyond."""
-    k = int(np.clip(np.searchsorted(at, where) - 1, 0, max(len(at) - 2, 0)))
-    if len(at) == 1:
-        return table[0]
-    share = float(np.clip((where - at[k]) / (at[k + 1] - at[k]), 0.0, 1.0))
-    return (1.0 - share) * table[k] + share * table[k + 1]
