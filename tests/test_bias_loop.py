@@ -20,8 +20,9 @@ from fabric_fenicsx.loop.kinds.bias_extension.frame_law import (
     locking_variant,
 )
 from fabric_fenicsx.loop.kinds.bias_extension.mixture import Travels
-from fabric_fenicsx.loop.kinds.bias_extension.model import OFTEN, SELDOM, BiasExtension
+from fabric_fenicsx.loop.kinds.bias_extension.model import BiasExtension
 from fabric_fenicsx.loop.kinds.bias_extension.phases import backward, phases_of, since_stop
+from fabric_fenicsx.loop.kinds.bias_extension.pulls import OFTEN, SELDOM
 from fabric_fenicsx.loop.kinds.bias_extension.quantities import read_together
 from fabric_fenicsx.loop.kinds.bias_extension.strip import (
     solved_strip,
@@ -141,7 +142,7 @@ def test_only_strips_whose_holds_are_read_are_solved_standing_still():
         "force_N": np.zeros(len(D) + 2),
     }
     strips = BiasExtension([measured(short, long, replace(held, columns=columns))])
-    *_, stops, holds, _ = strips._strips._strips
+    stops, holds = strips._strips._pulls.stops, strips._strips._pulls.holds
     assert stops.tolist() == [0, 0, SELDOM]
     # From where it stopped, and not from the first reading that it stands still at.
     assert holds == pytest.approx([0.0, 0.0, 10.0])
@@ -150,7 +151,7 @@ def test_only_strips_whose_holds_are_read_are_solved_standing_still():
     time = np.arange(len(D)) * (time[1] - time[0])
     columns = {"time_s": time, "displacement_mm": D, "force_N": np.zeros(len(D))}
     strips = BiasExtension([measured(short, replace(held, columns=columns))])
-    *_, stops, holds, _ = strips._strips._strips
+    stops, holds = strips._strips._pulls.stops, strips._strips._pulls.holds
     assert stops.tolist() == [0, OFTEN] and not holds.any()
 
 
@@ -241,7 +242,7 @@ def test_a_hold_does_not_make_a_crosshead_slow():
     D[-3] += 1e-9
     columns = {"time_s": 0.25 * np.arange(45), "displacement_mm": D, "force_N": np.zeros(45)}
     run = Run("run.csv", False, "", columns, own={"length_mm": LENGTH, "width_mm": WIDTH})
-    assert BiasExtension([measured(run)])._speed == pytest.approx(4.0, rel=0.01)
+    assert BiasExtension([measured(run)])._strips._pulls.speed == pytest.approx(4.0, rel=0.01)
 
 
 def test_what_is_pulled_once_is_not_solved_back(strip):

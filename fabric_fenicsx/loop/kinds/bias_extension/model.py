@@ -39,7 +39,8 @@ from .even_shear import EVEN, IN_WORDS, EvenZones, of_both
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
 from .going import columns_of, gone
 from .mixture import Holds, Part, Travels, number, of_ways
-from .phases import GONE_BACK, Phase, backward, moving, parted, phases_of, since_stop, speed_out
+from .phases import Phase, parted
+from .pulls import pulls_of
 from .quantities import coarser, first_curve, read_together, strip_of
 from .settled import Quantity
 from .solved import Solved, SolvedStrips
@@ -53,13 +54,8 @@ __all__ = ["BiasExtension"]
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-#: Speeds of the crosshead that are told apart differ by this factor; of others strips are solved
-#: at the mean. Half as much again of a dashpot is not foretold where tows slip.
-PACE = 1.5
 #: Share of a net of which corrections by a few per cent are not worth a solve.
 LITTLE_NET = 0.05
-#: How often a strip is stopped that stands still on its way, and one that does where it ends.
-OFTEN, SELDOM = 1000, 6
 #: Sets of strips of which it is kept how their crossings go.
 MOTIONS = 8
 #: Shares of even shear that fits may begin with.
@@ -205,30 +201,11 @@ class BiasExtension(CrossheadTest):
     def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
         D, time = self._points["D"].value, self._points["time"].value
         self._runs = list(runs)
-        rate = moving(self._points["D_rate"].value)
-        speed = speed_out(D, time, rate)
-        # Strips alike are solved once, as far as the furthest of them goes.
-        own_pace = np.log(speed)[self._parent]
-        paces = np.round(own_pace / np.log(PACE))
-        kinds = [(m.fabric, m.rig, run.own, n) for (m, run), n in zip(runs, paces, strict=True)]
-        same = [[other == own for other in kinds] for own in kinds]
-        self._furthest = np.array([D.max(axis=0)[own].max() for own in same])
-        self._speed = np.exp([own_pace[own].mean() for own in same])
-        self._back = backward(D, rate)
-        gone = np.max(np.where(self._back, self._furthest - D, 0.0), axis=0)
-        back = np.array([gone[own].max() for own in same]) > GONE_BACK * self._furthest
-        self._back &= back
-        self._phase = phases_of(D, rate, self._back)
-        # Of the points that are read: a record that is shorter than others rests at its last one.
+        moves = D, time, self._points["D_rate"].value
         points, of = self._recorded.place
-        since = since_stop(D, time, rate, self._phase, self._furthest)
-        often = np.where(np.isnan(since), OFTEN, SELDOM)
-        wanted = np.where(self._phase == Phase.STOPPED, often, 0)
-        stopped, longest = np.zeros(len(runs), dtype=np.int64), np.zeros(len(runs))
-        np.maximum.at(stopped, of, wanted[points, of])
-        np.maximum.at(longest, of, np.nan_to_num(since[points, of]))
-        stops, holds = (np.array([most[own].max() for own in same]) for most in (stopped, longest))
-        self._holds = Holds(since)
+        pulls = pulls_of(runs, self._parent, *moves, (points, of))
+        self._furthest, self._back, self._phase = pulls.furthest, pulls.on_its_way_back, pulls.phase
+        self._holds = Holds(pulls.since)
         # An angle is read of a strip whose force is, mostly at the same places: its crossings go
         # as they do in that run.
         moved = np.stack([self._points[name].value for name in ("time", "D", "D_rate")])
@@ -245,18 +222,17 @@ class BiasExtension(CrossheadTest):
             return self._going(parts, self._points["D"], self._points["D_rate"])
 
         self._of_recorded = lru_cache(maxsize=MOTIONS)(going)
-        for (m, run), travel, pace in zip(runs, self._furthest, self._speed, strict=True):
+        for (m, run), travel, pace in zip(runs, pulls.furthest, pulls.speed, strict=True):
             strip_case(m, run, float(travel), float(pace), {})
         self._even = self._even_zones(runs)
         if self._even is not None:
             self.baseline = (*self.baseline, EVEN)
         even = self._even is not None
         spaced = np.array([coarser(m, run) if even else 1.0 for m, run in runs])
-        self._typical_rate = self._half_way(speed[self._parent])
+        self._typical_rate = self._half_way(pulls.own_speed[self._parent])
         like = self._like
         paths = {} if like is None else like._strips.paths
-        strips = self._furthest, self._speed, back, stops, holds, spaced
-        self._strips: SolvedStrips = SolvedStrips(runs, *strips, paths)
+        self._strips: SolvedStrips = SolvedStrips(runs, pulls, spaced, paths)
         suggested = self._first
         if suggested is None:
             suggested = first_curve(self._of_forces()) if like is None else like.curve

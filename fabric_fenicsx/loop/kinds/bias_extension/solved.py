@@ -23,6 +23,7 @@ from ...measurement.schema import Measurement, Run
 from ...workers import each_of
 from .curves import KNOTS, Curve
 from .phases import Phase
+from .pulls import Pulls
 from .strip import STEPS, StripPath, solved_strip, strip_case
 from .ways import GROUPS, Way, alike, way_of
 
@@ -108,11 +109,7 @@ class SolvedStrips:
 
     Args:
         runs: with their measurements.
-        furthest: travel that each strip is solved up to [mm], (n_runs,).
-        speed: at which [mm/s], (n_runs,).
-        back: whether it is let back as well, (n_runs,).
-        stops: how often it is stopped on its way out; see solved_strip, (n_runs,).
-        holds: how long it is held where it got furthest [s], (n_runs,).
+        pulls: what each strip is solved for.
         coarser: by how much further apart than they are its tows are taken to be, (n_runs,).
         paths: of strips that were solved before, by what they were solved with; is added to.
 
@@ -127,16 +124,11 @@ class SolvedStrips:
     def __init__(
         self,
         runs: Sequence[tuple[Measurement, Run]],
-        furthest: Array,
-        speed: Array,
-        back: Flags,
-        stops: npt.NDArray[np.int64],
-        holds: Array,
+        pulls: Pulls,
         coarser: Array,
         paths: dict[Task, StripPath],
     ) -> None:
-        self._runs, self._furthest = list(runs), furthest
-        self._strips = furthest, speed, back, stops, holds, coarser
+        self._runs, self._pulls, self._coarser = list(runs), pulls, coarser
         self._groups: dict[int, npt.NDArray[np.int64]] = {}
         self._known: dict[str, list[Solved]] = {}
         self.paths = paths
@@ -213,13 +205,14 @@ class SolvedStrips:
         places: list[Task] = []
         for run, changes, curve in wanted:
             measurement, own = self._runs[run]
-            travel, pace, back, stops, hold, coarser = (of[run] for of in self._strips)
-            way = float(travel), float(pace), changes, steps, bool(back)
-            case = strip_case(measurement, own, *way, float(coarser), float(hold))
-            places.append((case.model_dump_json(), curve, int(stops)))
+            pulls, stops = self._pulls, int(self._pulls.stops[run])
+            way = float(pulls.furthest[run]), float(pulls.speed[run]), changes, steps
+            more = bool(pulls.back[run]), float(self._coarser[run]), float(pulls.holds[run])
+            case = strip_case(measurement, own, *way, *more)
+            places.append((case.model_dump_json(), curve, stops))
             if places[-1] not in self.paths:
                 put_off_in_copies()
-                tasks.setdefault(places[-1], (case, curve, int(stops)))
+                tasks.setdefault(places[-1], (case, curve, stops))
         order = sorted(tasks, key=lambda key: -tasks[key][0].length_mm * tasks[key][0].width_mm)
         stopped: dict[Task, Exception] = {}
         results = each_of(solved_strip, [tasks[key] for key in order])
@@ -282,7 +275,7 @@ class SolvedStrips:
     def _surprise(self, found: Solved, before: Solved) -> float:
         """By how much strips differ from what others had foretold of their curve."""
         off, size = [], []
-        for new, old, furthest in zip(found.ways, before.ways, self._furthest, strict=True):
+        for new, old, furthest in zip(found.ways, before.ways, self._pulls.furthest, strict=True):
             D = np.tile(np.linspace(0.0, furthest, TRAVELS)[1:], 2)
             phase = np.repeat(np.array([Phase.OUT, Phase.BACK], dtype=np.int8), TRAVELS - 1)
             force = new.force(D, phase, found.curve)
@@ -302,7 +295,7 @@ class SolvedStrips:
                 raise path
             whole.append(path)
         ways = [way_of(path, self._of_alike(r, path), curve) for r, path in enumerate(whole)]
-        return Solved.along(curve, ways, self._furthest)
+        return Solved.along(curve, ways, self._pulls.furthest)
 
     def _of_alike(self, run: int, path: StripPath) -> npt.NDArray[np.int64]:
         """Groups of a run's crossings, the same for all of its paths."""

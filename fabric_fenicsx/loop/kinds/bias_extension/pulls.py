@@ -1,0 +1,103 @@
+"""How strips are to be pulled, from what their crossheads were recorded to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ...measurement.schema import Measurement, Run
+from .phases import (
+    GONE_BACK,
+    Phase,
+    Phases,
+    backward,
+    moving,
+    phases_of,
+    since_stop,
+    speed_out,
+)
+
+__all__ = ["Pulls", "pulls_of"]
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+#: Speeds of the crosshead that are told apart differ by this factor; of others strips are solved
+#: at the mean. Half as much again of a dashpot is not foretold where tows slip.
+PACE = 1.5
+#: How often a strip is stopped that stands still on its way, and one that does where it ends.
+OFTEN, SELDOM = 1000, 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pulls:
+    """What each strip is solved for, and what its crosshead did.
+
+    Attributes:
+        furthest: travel that it is solved up to [mm], (n_runs,).
+        speed: at which [mm/s], (n_runs,).
+        back: whether it is let back as well, (n_runs,).
+        stops: how often it is stopped on its way out; see solved_strip, (n_runs,).
+        holds: how long it is held where it got furthest [s], (n_runs,).
+        own_speed: mean speed of its crosshead on the way out [mm/s], (n_runs,).
+        on_its_way_back: where crossheads are on a way back, (n_points, n_runs).
+        phase: what they do, (n_points, n_runs).
+        since: time since they stopped where they got furthest [s]; see since_stop.
+    """
+
+    furthest: Array
+    speed: Array
+    back: Flags
+    stops: npt.NDArray[np.int64]
+    holds: Array
+    own_speed: Array
+    on_its_way_back: Flags
+    phase: Phases
+    since: Array
+
+
+def pulls_of(
+    runs: Sequence[tuple[Measurement, Run]],
+    parent: npt.NDArray[np.int64],
+    D: Array,
+    time: Array,
+    speed: Array,
+    read: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]],
+) -> Pulls:
+    """What the strips of some runs are solved for; those alike once, as far as one of them goes.
+
+    Args:
+        runs: with their measurements.
+        parent: number of the run of forces that each belongs to, (n_runs,).
+        D: travels of the crossheads [mm], (n_points, n_runs).
+        time: at the points [s], (n_points, n_runs).
+        speed: of the crossheads [mm/s], (n_points, n_runs).
+        read: point and run of every reading: a record that is shorter than others rests at its
+            last point.
+    """
+    rate = moving(speed)
+    own_speed = speed_out(D, time, rate)
+    own_pace = np.log(own_speed)[parent]
+    paces = np.round(own_pace / np.log(PACE))
+    kinds = [(m.fabric, m.rig, run.own, n) for (m, run), n in zip(runs, paces, strict=True)]
+    alike = [[other == own for other in kinds] for own in kinds]
+    furthest = np.array([D.max(axis=0)[own].max() for own in alike])
+    on_its_way_back = backward(D, rate)
+    gone = np.max(np.where(on_its_way_back, furthest - D, 0.0), axis=0)
+    back = np.array([gone[own].max() for own in alike]) > GONE_BACK * furthest
+    on_its_way_back &= back
+    phase = phases_of(D, rate, on_its_way_back)
+    since = since_stop(D, time, rate, phase, furthest)
+    points, of = read
+    often = np.where(np.isnan(since), OFTEN, SELDOM)
+    wanted = np.where(phase == Phase.STOPPED, often, 0)
+    stopped, longest = np.zeros(len(runs), dtype=np.int64), np.zeros(len(runs))
+    np.maximum.at(stopped, of, wanted[points, of])
+    np.maximum.at(longest, of, np.nan_to_num(since[points, of]))
+    stops, holds = (np.array([most[own].max() for own in alike]) for most in (stopped, longest))
+    pace = np.exp([own_pace[own].mean() for own in alike])
+    own = own_speed, on_its_way_back, phase, since
+    return Pulls(furthest, pace, back, stops, holds, *own)
