@@ -10,7 +10,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from ...inference.effects import Effect
-from ..picture_frame.rig_terms import STRIP_RIG
+from ..picture_frame.rig_variables import STRIP_RIG
 from ..picture_frame.shapes import Ends
 from ..picture_frame.terms import terms
 

@@ -17,7 +17,8 @@ from ....mechanics.laws.law import CrossingLaw
 from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ONE_SIDED, ONE_WAY, ShapedLaw
 from ...inference.effects import Effect, Values, valued
 from ..records import FEWEST_BEFORE
-from .rig_terms import RIG, Rig, rig_terms
+from .rig_terms import rig_terms
+from .rig_variables import RIG, Rig
 from .shapes import (
     FINE,
     FORGETFUL,
