@@ -55,6 +55,8 @@ class CrossheadTest:
     notes: Sequence[str] = ()
     terms_are_rivals = False
     in_copies = True
+    #: Whether what gives way with the force is found with the force and the rate that it leaves.
+    gives_way = True
     each_its_own_way = False
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType({})
     alike: frozenset[str] = frozenset()
@@ -258,7 +260,7 @@ class CrossheadTest:
         moved = np.diff(D, axis=0, prepend=D[:1])
         change = np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0, prepend=0.0)
         change[0] = 0.0
-        force = float(np.abs(self.readings.observed[rows]).max())
+        force = float(np.abs(self._fitted_forces).max())
         acceleration = self._recorded.acceleration.value
         return {
             "angle": most(self._gamma),
@@ -273,13 +275,22 @@ class CrossheadTest:
             "force_rate": force / max(float(np.median(time[-1])), 1e-9),
         }
 
+    @property
+    def _fitted_forces(self) -> Array:
+        """Forces of the runs that are fitted [N], also where a speed is not known, (n,).
+
+        What goes by the force has to reach that far in between.
+        """
+        rows = self.readings.first & ~self.readings.holdout
+        return self.readings.observed[rows & np.isfinite(self.readings.observed)]
+
     def _ends(self) -> dict[str, tuple[float, float]]:
         """Between which shares of their largest sizes signed variables of terms are."""
         rows = self.readings.fit & self.readings.first
         signed = {
             "displacement": self._recorded.at_readings(self._points["D"].value)[rows],
             "speed": self._recorded.at_readings(self._points["D_rate"].value)[rows],
-            "force": self.readings.observed[rows],
+            "force": self._fitted_forces,
             "acceleration": self._recorded.at_readings(self._recorded.acceleration.value)[rows],
         }
 
@@ -316,8 +327,7 @@ class CrossheadTest:
         travels = [v for v in mine if v.travel is not None]
         travel = self._recorded.travel(travels[0] if travels else None, values)
         for v in (v for v in mine if v.added_travel is not None):
-            ahead = self._ahead(v, travel, mine, values)
-            travel = self._recorded.moved(travel, v, ahead, values)
+            travel = self._moved(v, travel, mine, values)
         whole = self._force(travel, mine, values)
         zeros: list[tuple[Flags, Array]] = []
         cell = Varying(np.asarray(self._on_the_load_cell))
@@ -348,23 +358,26 @@ class CrossheadTest:
                 found[name][rows] -= J @ np.linalg.lstsq(J, slope[rows], rcond=None)[0]
         return self._recorded.at_readings(force), found
 
-    def _ahead(
+    def _moved(
         self,
         variant: FrameVariant,
         travel: Any,
         variants: Sequence[FrameVariant],
         values: Mapping[str, float],
-    ) -> Varying:
-        """What a form adds to the travel [mm].
+    ) -> Any:
+        """A travel with what a form adds to it [mm], and its rate.
 
         What is little goes by the force with the travel as it would be without.
         """
         added = partial(self._added_travel, variant, variants, values)
-        if not variant.rounds:
-            return added(travel)
+        if not variant.rounds or (variant.in_series and not self.gives_way):
+            return self._recorded.moved(travel, variant, added(travel), values)
         names = [p.name for p in (*self.baseline, *(p for v in variants for p in v.parameters))]
         own = {name: values[name] for name in names if name in values}
-        return self._slips.of(variant, variants, own, added, travel)
+        ahead, *faster = self._slips.of(variant, variants, own, added, travel)
+        if not faster:
+            return self._recorded.moved(travel, variant, ahead, values)
+        return {**travel, "D": travel["D"] + ahead, "D_rate": travel["D_rate"] + faster[0]}
 
     def _added_travel(
         self,

@@ -183,7 +183,7 @@ class RecordedRig:
             faster = self._faster(variant, values)
         else:
             faster = self.per_second(ahead)
-        return {"D": travel["D"] + ahead, "D_rate": travel["D_rate"] + faster}
+        return {**travel, "D": travel["D"] + ahead, "D_rate": travel["D_rate"] + faster}
 
     def _faster(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
         """How fast what a form adds to the travel changes, by the place or the time [mm/s]."""

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ..expressions.marching import Varying
 from ..inference.first_order import SMALL
+from .giving_way import in_series
 from .picture_frame.variant import FrameVariant
 
 __all__ = ["Slips", "left_by"]
@@ -21,6 +22,9 @@ __all__ = ["Slips", "left_by"]
 Array = npt.NDArray[np.float64]
 Added = Callable[[Any, Collection[str] | None], Varying]
 """What is added to a travel [mm], from one, with some derivatives; None: with all there are."""
+
+_Known = tuple[Any, dict[str, float], tuple[Varying, ...]]
+"""Forms of a model, its numbers, and what slipped."""
 
 #: Models of which it is kept what slipped.
 MOST = 4
@@ -34,7 +38,9 @@ class Slips:
     """What forms that slip added to the travel, beside which forms with which parameters."""
 
     def __init__(self) -> None:
-        self._known: dict[FrameVariant, list[tuple[Any, dict[str, float], Varying]]] = {}
+        self._known: dict[
+            FrameVariant, list[tuple[Any, dict[str, float], tuple[Varying, ...]]]
+        ] = {}
 
     def clear(self) -> None:
         """Forget all, as forces are foretold in another way from now on."""
@@ -47,8 +53,8 @@ class Slips:
         values: Mapping[str, float],
         added: Added,
         travel: Any,
-    ) -> Varying:
-        """What a form adds to the travel [mm].
+    ) -> tuple[Varying, ...]:
+        """What a form adds to the travel [mm] and, if that is in series, how fast that changes.
 
         What others that are next to nothing would have to do with it is left to where there is
         more of them.
@@ -70,7 +76,11 @@ class Slips:
                 and all(values[name] == number for name, number in numbers.items())
             ):
                 return known
-        found = left_by(added, travel, variant.rounds)
+        found: tuple[Varying, ...]
+        if variant.in_series:
+            found = in_series(lambda there: added(there, None), travel, variant.rounds)
+        else:
+            found = (left_by(added, travel, variant.rounds),)
         before = [one for one in self._known.get(variant, ()) if one[0] != tuple(variants)]
         latest = (tuple(variants), dict(values), found)
         self._known[variant] = [latest, *before[: MOST - 1]]

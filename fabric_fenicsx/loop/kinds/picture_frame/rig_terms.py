@@ -65,8 +65,8 @@ a play, where it has just turned."""
 SLIP_SHAPES = ("linear", "2 coefficients", "3 coefficients", "corner", "saturation")
 """Of what slips: nothing of it is infinitely steep at no force."""
 
-SLIP_ROUNDS = 3
-"""Steps in which what slips is found with the force that it leaves."""
+ROUNDS = 3
+"""Steps in which what slips, or gives way, is found with the force that it leaves."""
 
 AGAINST_THE_MOTION = ("displacement", "force", "time", "run")
 """What a friction or a play of the rig may depend on; it has the sign of the speed."""
@@ -275,6 +275,8 @@ def of_the_rig(
     of = [*kind.of, *(name for other in others for name in other.of)]
     of += ["free_length"] * (acts_on == "slip")
     of += ["per_time"] * (turning == "over a way")
+    in_series = acts_on == "travel" and set(of) <= {"force", "time", "run"} and "force" in of
+    in_series &= remembered is None and not turning
     return FrameVariant(
         label,
         parameters,
@@ -284,7 +286,8 @@ def of_the_rig(
         variable=kind.value if kind.remembered is not None else None,
         added_reading=whole if acts_on == "reading" else None,
         added_travel={"travel": whole, "slip": slipped}.get(acts_on),
-        rounds=SLIP_ROUNDS if "width" in of else 0,
+        rounds=ROUNDS if in_series or "width" in of else 0,
+        in_series=in_series,
     )
 
 

@@ -42,6 +42,7 @@ class FrameVariant(Variant):
         of_baseline: parameters of the baseline that ``laws`` needs as well.
         rounds: steps of Newton's in which ``added_travel`` is found with the force that it leaves;
             0: with that without it.
+        in_series: ... and at the rate that it leaves, as what gives way at once does.
         each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
             has. Those of a holdout run can only come from that run: its error is then what is
             left after them.
@@ -61,6 +62,7 @@ class FrameVariant(Variant):
     like: FrameVariant | None = None
     of_baseline: tuple[str, ...] = ()
     rounds: int = 0
+    in_series: bool = False
     each_run: bool = False
 
     @property

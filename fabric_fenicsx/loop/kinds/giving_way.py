@@ -1,0 +1,176 @@
+"""What gives way in series with a rig, with the force and at once, as a soft load train does.
+
+Where a fabric resists by its rate, what gives way does so over some time. With g what it is by the
+force, D the crosshead's place and x what is added to the travel,
+
+    x = g(D + x, Ḋ + ẋ)
+
+and with y what that would come to at the speed of the crosshead, to first order
+
+    κ ẋ = y − x,    κ = −∂g/∂Ḋ / (1 − ∂g/∂D).
+
+It begins with nothing. Over a step h in which y changes evenly, by s each second,
+
+    ẋ = s + w (x − x₋ − s h),    w = 1 / (κ (exp(h/κ) − 1))
+
+at its end, exactly so for one κ, with x₋ what x was at its beginning. Where the crosshead has
+another speed after a corner, by ΔḊ, y has jumped there by −κ ΔḊ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import solve_banded
+
+from ..expressions.marching import Varying
+
+__all__ = ["in_series"]
+
+Array = npt.NDArray[np.float64]
+
+#: Names of the derivatives by the travel and by its rate, beside those by parameters.
+BY_TRAVEL, BY_RATE = "travel", "rate of the travel"
+#: Share of the larger of two speeds by which they differ on both sides of a corner.
+CORNER = 0.3
+#: Share of the largest travel, and speed, by which these differ where κ is asked for again.
+STEP = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Asked:
+    """G at an x and a rate.
+
+    Attributes:
+        off: g − x [mm].
+        slopes: its derivatives by the parameters.
+        by_travel, by_rate: ∂g/∂D and ∂g/∂Ḋ, none above 0: more of either makes more force.
+    """
+
+    off: Array
+    slopes: dict[str, Array]
+    by_travel: Array
+    by_rate: Array
+
+    @property
+    def kappa(self) -> Array:
+        """κ [s]."""
+        return -self.by_rate / (1.0 - self.by_travel)
+
+
+Ask = Callable[[Array, Varying], _Asked]
+
+
+def in_series(added: Callable[[Any], Varying], travel: Any, rounds: int) -> tuple[Varying, Varying]:
+    """What is added to a travel [mm] by the force that it leaves, and how fast that changes.
+
+    Newton's steps for x are of all points together: a matrix with one diagonal beside its own. What
+    laws remember is taken as it is in each step.
+
+    Args:
+        added: g, from a travel.
+        travel: at all points, with "per_time".
+        rounds: steps, for y and for x.
+    """
+    V, per_time = travel["D_rate"], travel["per_time"].value
+    ask = _asking(added, travel)
+    y = np.zeros(travel["D"].value.shape)
+    for _ in range(rounds):
+        at = ask(y, V)
+        y = y + at.off / (1.0 - at.by_travel)
+    at = ask(y, V)
+    settled = Varying(y, {p: slope / (1.0 - at.by_travel) for p, slope in at.slopes.items()})
+    kappa = _kappa(ask, at, settled, travel)
+    corners = Varying(_turned(V.value) * per_time)
+    s = _change(settled) * Varying(per_time) + kappa * corners
+    weight = _weight(kappa, per_time)
+    # ẋ, as far as it does not hang on x.
+    rest = s + s * weight * Varying(-1.0 / per_time)
+    begins = np.zeros((len(y), 1))
+    begins[0] = 1.0
+    x = y * (1.0 - begins)
+    for _ in range(rounds):
+        at = ask(x, V + rest + weight * Varying(_differences(x)))
+        matrix = 1.0 - at.by_travel - at.by_rate * weight.value, at.by_rate * weight.value
+        x = x + _solved(matrix, at.off * (1.0 - begins))
+    found = Varying(
+        x, {p: _solved(matrix, slope * (1.0 - begins)) for p, slope in at.slopes.items()}
+    )
+    return found, rest + weight * _change(found)
+
+
+def _asking(added: Callable[[Any], Varying], travel: Any) -> Ask:
+    """G, asked for at an x and a rate."""
+    D = travel["D"]
+    one = np.ones(D.value.shape)
+
+    def ask(x: Array, rate: Varying) -> _Asked:
+        there = Varying(D.value + x, {**D.slopes, BY_TRAVEL: one})
+        found = added({**travel, "D": there, "D_rate": Varying(rate.value, rate.slopes | of_rate)})
+        slopes = {p: np.broadcast_to(slope, one.shape) for p, slope in found.slopes.items()}
+        by = (np.minimum(slopes.pop(name, 0.0 * one), 0.0) for name in (BY_TRAVEL, BY_RATE))
+        return _Asked(found.value - x, slopes, *by)
+
+    of_rate = {BY_RATE: one}
+    return ask
+
+
+def _kappa(ask: Ask, at: _Asked, settled: Varying, travel: Any) -> Varying:
+    """κ where it has settled, with its derivatives by the parameters.
+
+    By the parameters, ∂g/∂D changes as their derivatives do by the travel; so does ∂g/∂Ḋ by its
+    rate. These are differences.
+    """
+    rate = travel["D_rate"]
+    step, faster = (STEP * (float(np.abs(v.value).max()) or 1.0) for v in (travel["D"], rate))
+    further = ask(settled.value + step, rate)
+    quicker = ask(settled.value, rate + Varying(np.full(settled.value.shape, faster)))
+    free, kappa = 1.0 - at.by_travel, at.kappa
+    by_place = (further.kappa - kappa) / step
+    slopes = {}
+    for p, slope in at.slopes.items():
+        of_travel = (further.slopes[p] - slope) / step
+        of_rate = (quicker.slopes[p] - slope) / faster
+        # ∂κ/∂p = (−∂g_Ḋ/∂p + κ ∂g_D/∂p) / (1 − g_D), and where x is goes by the parameters, too.
+        slopes[p] = (kappa * of_travel - of_rate) / free + by_place * settled.slopes[p]
+    return Varying(kappa, {p: np.where(kappa > 0.0, slope, 0.0) for p, slope in slopes.items()})
+
+
+def _weight(kappa: Varying, per_time: Array) -> Varying:
+    """W of the module's docstring; nothing where κ is."""
+    k = np.where(kappa.value > 0.0, kappa.value, 1.0)
+    steps = np.minimum(1.0 / (per_time * k), 500.0)
+    decayed = -np.expm1(-steps)
+    weight = np.where(kappa.value > 0.0, np.exp(-steps) / (k * decayed), 0.0)
+    by_kappa = weight * (steps / decayed - 1.0) / k
+    return Varying(weight, {p: by_kappa * slope for p, slope in kappa.slopes.items()})
+
+
+def _differences(values: Array) -> Array:
+    """From the point before, along each record; 0 at the first."""
+    return np.diff(values, axis=0, prepend=values[:1])
+
+
+def _change(of: Varying) -> Varying:
+    return Varying(_differences(of.value), {p: _differences(v) for p, v in of.slopes.items()})
+
+
+def _turned(speed: Array) -> Array:
+    """Changes of crossheads' speeds [mm/s] since the point before where these are corners."""
+    change, size = _differences(speed), np.abs(speed)
+    both = np.maximum(size, np.concatenate([size[:1], size[:-1]]))
+    return np.where(np.abs(change) > CORNER * both, change, 0.0)
+
+
+def _solved(matrix: tuple[Array, Array], right: Array) -> Array:
+    """Solution of a system with a diagonal, and one of the points before, of each record."""
+    own, before = matrix
+    found = np.empty(own.shape)
+    for r in range(own.shape[1]):
+        banded = np.stack([own[:, r], np.append(before[1:, r], 0.0)])
+        found[:, r] = solve_banded((1, 0), banded, right[:, r], check_finite=False)
+    return found
