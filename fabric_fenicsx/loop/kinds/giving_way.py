@@ -37,6 +37,8 @@ Array = npt.NDArray[np.float64]
 BY_TRAVEL, BY_RATE = "travel", "rate of the travel"
 #: Share of the larger of two speeds by which they differ on both sides of a corner.
 CORNER = 0.3
+#: κ over a step below which nothing of it is left at the end.
+AT_ONCE = 1e-2
 #: Share of the largest travel, and speed, by which these differ where κ is asked for again.
 STEP = 1e-6
 
@@ -141,11 +143,12 @@ def _kappa(ask: Ask, at: _Asked, settled: Varying, travel: Any) -> Varying:
 
 
 def _weight(kappa: Varying, per_time: Array) -> Varying:
-    """W of the module's docstring; nothing where κ is."""
-    k = np.where(kappa.value > 0.0, kappa.value, 1.0)
-    steps = np.minimum(1.0 / (per_time * k), 500.0)
+    """W of the module's docstring; nothing where all has settled long before a step ends."""
+    lasts = kappa.value * per_time > AT_ONCE
+    k = np.where(lasts, kappa.value, 1.0 / per_time)
+    steps = 1.0 / (per_time * k)
     decayed = -np.expm1(-steps)
-    weight = np.where(kappa.value > 0.0, np.exp(-steps) / (k * decayed), 0.0)
+    weight = np.where(lasts, np.exp(-steps) / (k * decayed), 0.0)
     by_kappa = weight * (steps / decayed - 1.0) / k
     return Varying(weight, {p: by_kappa * slope for p, slope in kappa.slopes.items()})
 
