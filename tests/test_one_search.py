@@ -98,7 +98,7 @@ def test_a_model_is_weighed_by_what_its_fit_has_got_to(monkeypatch):
     found = fit(test, effect.variants, start, test.readings.fit, Variances(NOISE))
     there = models.weighed([found])[0]
     stuck = replace(found, residual=found.residual - 0.05 * found.slopes[:, 2])
-    monkeypatch.setattr("fabric_fenicsx.loop.inference.models.fit", lambda *args, **more: stuck)
+    monkeypatch.setattr("fabric_fenicsx.loop.inference.refining.fit", lambda *args, **more: stuck)
     at_first = models.weighed([stuck])[0]
     assert at_first.criterion == pytest.approx(there.criterion, abs=1.0), "to first order it is"
     last = models.refined(at_first)

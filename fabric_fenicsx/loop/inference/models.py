@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -19,11 +18,12 @@ from .fitting import fit, parameters_of
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise
 from .ranking import cancelling, nearest_forms, nothing_left, simplest_first
+from .refining import REFINED_WITHIN, fitted_to_the_end, refined
 from .screen import Signatures
-from .starts import around_jumps, fit_combinations
+from .starts import fit_combinations
 from .variances import Variances
 
-__all__ = ["REFINED_WITHIN", "Models"]
+__all__ = ["Models"]
 
 #: Scatter of specimens, as a share, that first fits allow for.
 FIRST_SCATTER = 0.1
@@ -31,10 +31,8 @@ FIRST_SCATTER = 0.1
 ALIKE, VISIBLE = 0.01, 0.05
 #: Forms whose own variances are looked for, beside the best ones of each set of effects.
 MOST_NEAR, OF_A_SET = 16, 2
-#: Models whose parameters are fitted again with their own variances ...
+#: Models whose parameters are fitted again with their own variances, if they are near enough.
 REFINED = 3
-#: ... if their criterion is within this of the best.
-REFINED_WITHIN = 60.0
 #: Noise over what it was taken to be for the first fits, below which these are looked at again; how
 #: many are, and how many of a set of effects.
 QUIETER, AGAIN, AGAIN_OF_A_SET = 0.8, 12, 4
@@ -265,22 +263,12 @@ class Models:
         return sorted(models, key=lambda m: m.criterion)
 
     def refined(self, model: Model, best: float = float("inf")) -> Model:
-        """A model fitted again with its own noise and scatter; the old one if there is none.
+        """A model fitted again with its own noise and scatter; see refining.refined."""
+        return refined(self.experiment, self.judge, model, best)
 
-        Args:
-            model: the model.
-            best: criterion beside which one that is far behind need not be exact.
-        """
-        near = model.criterion <= best + REFINED_WITHIN
-        for last in (False, True):
-            variances = self.judge.averaged(model) if last else model.estimate.variances
-            try:
-                if near and not last:
-                    self.experiment.settle(model.fit.variants, model.fit.values)
-                model = self._again(model, variances, CRITERIA.evaluations)
-            except SolveError:
-                break
-        return self._as_attained(model)
+    def last(self, model: Model) -> Model:
+        """A model fitted to the end; see refining.fitted_to_the_end."""
+        return fitted_to_the_end(self.experiment, self.judge, model)
 
     def each_refined(self, models: Sequence[Model], best: float = float("inf")) -> list[Model]:
         """Each of some models; see refined."""
@@ -303,46 +291,6 @@ class Models:
         own = [one for model in fits for one in (model, model.used, *model.variants)]
         return [self.experiment.readings, self.judge.rows, *own, *more]
 
-    def _again(self, model: Model, variances: Variances, evaluations: int) -> Model:
-        """A model fitted again from where it is, with other variances."""
-        found = fit(
-            self.experiment,
-            model.fit.variants,
-            model.fit.values,
-            model.fit.used,
-            variances,
-            deviations=model.fit.deviations,
-            evaluations=evaluations,
-        )
-        return self.judge.weighed(found, model.effects)
-
-    def last(self, model: Model) -> Model:
-        """A model fitted to the end; the old one where there is no solution on the way."""
-        try:
-            self.experiment.settle(model.fit.variants, model.fit.values)
-            # With its own noise and scatter another side of a jump may be the better one.
-            found = around_jumps(self.experiment, model.fit, CRITERIA.evaluations, None)
-            if found is not model.fit:
-                model = self.judge.weighed(found, model.effects)
-            last = self._again(model, self.judge.averaged(model), CRITERIA.final_evaluations)
-        except SolveError:
-            return model
-        # What was chosen is reported, and not a fit that went astray on the way.
-        left, before = (one.fit.rms(one.fit.used) for one in (last, model))
-        return self._as_attained(last if left <= CRITERIA.scatter * before else model)
-
-    def _as_attained(self, model: Model) -> Model:
-        """A model that was fitted with its own variances, by what that fit leaves.
-
-        Likelihoods are those at the end of a step to first order, which then is a small one; but
-        where the readings have a kink or a jump there may be no such step.
-        """
-        missed = model.estimate.unattained
-        if missed < CRITERIA.decisive:
-            return model
-        attained = model.estimate.likelihood + self.judge.cost(model.fit, model.effects) + missed
-        return replace(model, criterion=attained)
-
     def best_refined(self, models: list[Model], beside: float = float("inf")) -> list[Model]:
         """Models, the best first; the best of each set of effects was fitted again.
 
@@ -353,16 +301,16 @@ class Models:
             beside: criterion of what else there is: of those far behind it only the first are
                 fitted again.
         """
-        refined: list[Model] = []
+        done: list[Model] = []
         ahead: dict[Model, Model] = {}
         rest = sorted(models, key=lambda m: m.criterion)
         while rest:
-            best = min((m.criterion for m in refined), default=float("inf"))
+            best = min((m.criterion for m in done), default=float("inf"))
             nearest = min(best, beside)
-            if len(refined) >= REFINED and rest[0].criterion >= best:
+            if len(done) >= REFINED and rest[0].criterion >= best:
                 break
-            far = bool(refined) and rest[0].criterion > nearest + REFINED_WITHIN
-            if far or len(refined) >= 2 * REFINED:
+            far = bool(done) and rest[0].criterion > nearest + REFINED_WITHIN
+            if far or len(done) >= 2 * REFINED:
                 break
             model = rest[0]
             if model not in self._refined:
@@ -375,8 +323,8 @@ class Models:
             # Another start that leads to the same place.
             same = [m for m in rest if m.fit.variants == model.fit.variants]
             rest = [m for m in rest if m not in same or m.criterion < model.criterion - 1.0]
-            refined.append(model)
-        return simplest_first(refined) + rest
+            done.append(model)
+        return simplest_first(done) + rest
 
     def _first_ones(self, rest: Sequence[Model], best: float) -> list[Model]:
         """The first model and the next ones that are likely to be refined after it.

@@ -8,8 +8,9 @@ from .criteria import CRITERIA
 from .diagnosis import Pair
 from .effects import Effect
 from .judge import Model
-from .models import REFINED_WITHIN, Models
+from .models import Models
 from .ranking import nearest_forms
+from .refining import REFINED_WITHIN
 from .screen import Screen
 
 __all__ = ["InPlace", "in_place", "near", "pairs_of", "rivals_of"]
