@@ -37,6 +37,8 @@ Array = npt.NDArray[np.float64]
 BY_TRAVEL, BY_RATE = "travel", "rate of the travel"
 #: Share of the larger of two speeds by which they differ on both sides of a corner.
 CORNER = 0.3
+#: Least 1 − ∂g/∂D.
+LEAST_FREE = 0.2
 #: κ over a step below which nothing of it is left at the end.
 AT_ONCE = 1e-2
 #: Share of the largest travel, and speed, by which these differ where κ is asked for again.
@@ -50,7 +52,8 @@ class _Asked:
     Attributes:
         off: g − x [mm].
         slopes: its derivatives by the parameters.
-        by_travel, by_rate: ∂g/∂D and ∂g/∂Ḋ, none above 0: more of either makes more force.
+        by_travel, by_rate: ∂g/∂D and ∂g/∂Ḋ: more of either makes more force, so that they are
+            negative where that is what gives way to it.
     """
 
     off: Array
@@ -59,9 +62,14 @@ class _Asked:
     by_rate: Array
 
     @property
+    def free(self) -> Array:
+        """1 − ∂g/∂D; what the force would push further has no end from 0 on."""
+        return np.maximum(1.0 - self.by_travel, LEAST_FREE)
+
+    @property
     def kappa(self) -> Array:
-        """κ [s]."""
-        return -self.by_rate / (1.0 - self.by_travel)
+        """κ [s]; negative where the force pushes the frame ahead, which is taken to be at once."""
+        return -self.by_rate / self.free
 
 
 Ask = Callable[[Array, Varying], _Asked]
@@ -83,9 +91,9 @@ def in_series(added: Callable[[Any], Varying], travel: Any, rounds: int) -> tupl
     y = np.zeros(travel["D"].value.shape)
     for _ in range(rounds):
         at = ask(y, V)
-        y = y + at.off / (1.0 - at.by_travel)
+        y = y + at.off / at.free
     at = ask(y, V)
-    settled = Varying(y, {p: slope / (1.0 - at.by_travel) for p, slope in at.slopes.items()})
+    settled = Varying(y, {p: slope / at.free for p, slope in at.slopes.items()})
     kappa = _kappa(ask, at, settled, travel)
     corners = Varying(_turned(V.value) * per_time)
     s = _change(settled) * Varying(per_time) + kappa * corners
@@ -97,7 +105,7 @@ def in_series(added: Callable[[Any], Varying], travel: Any, rounds: int) -> tupl
     x = y * (1.0 - begins)
     for _ in range(rounds):
         at = ask(x, V + rest + weight * Varying(_differences(x)))
-        matrix = 1.0 - at.by_travel - at.by_rate * weight.value, at.by_rate * weight.value
+        matrix = at.free - at.by_rate * weight.value, at.by_rate * weight.value
         x = x + _solved(matrix, at.off * (1.0 - begins))
     found = Varying(
         x, {p: _solved(matrix, slope * (1.0 - begins)) for p, slope in at.slopes.items()}
@@ -114,7 +122,7 @@ def _asking(added: Callable[[Any], Varying], travel: Any) -> Ask:
         there = Varying(D.value + x, {**D.slopes, BY_TRAVEL: one})
         found = added({**travel, "D": there, "D_rate": Varying(rate.value, rate.slopes | of_rate)})
         slopes = {p: np.broadcast_to(slope, one.shape) for p, slope in found.slopes.items()}
-        by = (np.minimum(slopes.pop(name, 0.0 * one), 0.0) for name in (BY_TRAVEL, BY_RATE))
+        by = (slopes.pop(name, 0.0 * one) for name in (BY_TRAVEL, BY_RATE))
         return _Asked(found.value - x, slopes, *by)
 
     of_rate = {BY_RATE: one}
@@ -131,15 +139,15 @@ def _kappa(ask: Ask, at: _Asked, settled: Varying, travel: Any) -> Varying:
     step, faster = (STEP * (float(np.abs(v.value).max()) or 1.0) for v in (travel["D"], rate))
     further = ask(settled.value + step, rate)
     quicker = ask(settled.value, rate + Varying(np.full(settled.value.shape, faster)))
-    free, kappa = 1.0 - at.by_travel, at.kappa
+    kappa = at.kappa
     by_place = (further.kappa - kappa) / step
     slopes = {}
     for p, slope in at.slopes.items():
         of_travel = (further.slopes[p] - slope) / step
         of_rate = (quicker.slopes[p] - slope) / faster
         # ∂κ/∂p = (−∂g_Ḋ/∂p + κ ∂g_D/∂p) / (1 − g_D), and where x is goes by the parameters, too.
-        slopes[p] = (kappa * of_travel - of_rate) / free + by_place * settled.slopes[p]
-    return Varying(kappa, {p: np.where(kappa > 0.0, slope, 0.0) for p, slope in slopes.items()})
+        slopes[p] = (kappa * of_travel - of_rate) / at.free + by_place * settled.slopes[p]
+    return Varying(kappa, slopes)
 
 
 def _weight(kappa: Varying, per_time: Array) -> Varying:
