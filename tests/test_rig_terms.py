@@ -89,8 +89,7 @@ def creeping_grips(t, D, speed):
 def soft_train(t, D, speed):
     """It gives way by 0.05 mm/N, at once; the fabric's dashpot lets it go over half a second."""
     fine = np.linspace(t[0], t[-1], 10 * (len(t) - 1) + 1)
-    slip = given_way(fine, np.interp(fine, t, D), lambda force, behind, h: 0.05 * force)
-    return slip[::10]
+    return given_way(fine, np.interp(fine, t, D), lambda force, behind, h: 0.05 * force)[::10]
 
 
 def rubbing_guide(t, D, speed):

@@ -371,13 +371,11 @@ class CrossheadTest:
         """
         added = partial(self._added_travel, variant, variants, values)
         if not variant.rounds or (variant.in_series and not self.gives_way):
-            return self._recorded.moved(travel, variant, added(travel), values)
+            return self._recorded.moved(travel, variant, values, added(travel))
         names = [p.name for p in (*self.baseline, *(p for v in variants for p in v.parameters))]
         own = {name: values[name] for name in names if name in values}
-        ahead, *faster = self._slips.of(variant, variants, own, added, travel)
-        if not faster:
-            return self._recorded.moved(travel, variant, ahead, values)
-        return {**travel, "D": travel["D"] + ahead, "D_rate": travel["D_rate"] + faster[0]}
+        found = self._slips.of(variant, variants, own, added, travel)
+        return self._recorded.moved(travel, variant, values, *found)
 
     def _added_travel(
         self,

@@ -19,7 +19,7 @@ another speed after a corner, by ΔḊ, y has jumped there by −κ ΔḊ.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,10 +28,13 @@ import numpy.typing as npt
 from scipy.linalg import solve_banded
 
 from ..expressions.marching import Varying
+from .records import one_point_before, shifted
 
-__all__ = ["in_series"]
+__all__ = ["BY_TRAVEL", "Added", "in_series"]
 
 Array = npt.NDArray[np.float64]
+Added = Callable[[Any, Collection[str] | None], Varying]
+"""What is added to a travel [mm], from one, with some derivatives; None: with all there are."""
 
 #: Names of the derivatives by the travel and by its rate, beside those by parameters.
 BY_TRAVEL, BY_RATE = "travel", "rate of the travel"
@@ -72,17 +75,18 @@ class _Asked:
         return -self.by_rate / self.free
 
 
-Ask = Callable[[Array, Varying], _Asked]
+Ask = Callable[[Array, Varying, bool], _Asked]
+"""G at an x and a rate, by the parameters as well or by the travel and its rate alone."""
 
 
-def in_series(added: Callable[[Any], Varying], travel: Any, rounds: int) -> tuple[Varying, Varying]:
+def in_series(added: Added, travel: Any, rounds: int) -> tuple[Varying, Varying]:
     """What is added to a travel [mm] by the force that it leaves, and how fast that changes.
 
     Newton's steps for x are of all points together: a matrix with one diagonal beside its own. What
-    laws remember is taken as it is in each step.
+    laws remember is taken as it is in each step, and in the derivatives.
 
     Args:
-        added: g, from a travel.
+        added: g.
         travel: at all points, with "per_time".
         rounds: steps, for y and for x.
     """
@@ -90,9 +94,9 @@ def in_series(added: Callable[[Any], Varying], travel: Any, rounds: int) -> tupl
     ask = _asking(added, travel)
     y = np.zeros(travel["D"].value.shape)
     for _ in range(rounds):
-        at = ask(y, V)
+        at = ask(y, V, False)
         y = y + at.off / at.free
-    at = ask(y, V)
+    at = ask(y, V, True)
     settled = Varying(y, {p: slope / at.free for p, slope in at.slopes.items()})
     kappa = _kappa(ask, at, settled, travel)
     corners = Varying(_turned(V.value) * per_time)
@@ -103,8 +107,8 @@ def in_series(added: Callable[[Any], Varying], travel: Any, rounds: int) -> tupl
     begins = np.zeros((len(y), 1))
     begins[0] = 1.0
     x = y * (1.0 - begins)
-    for _ in range(rounds):
-        at = ask(x, V + rest + weight * Varying(_differences(x)))
+    for k in range(rounds):
+        at = ask(x, V + rest + weight * _change(Varying(x)), k == rounds - 1)
         matrix = at.free - at.by_rate * weight.value, at.by_rate * weight.value
         x = x + _solved(matrix, at.off * (1.0 - begins))
     found = Varying(
@@ -113,19 +117,20 @@ def in_series(added: Callable[[Any], Varying], travel: Any, rounds: int) -> tupl
     return found, rest + weight * _change(found)
 
 
-def _asking(added: Callable[[Any], Varying], travel: Any) -> Ask:
-    """G, asked for at an x and a rate."""
+def _asking(added: Added, travel: Any) -> Ask:
     D = travel["D"]
     one = np.ones(D.value.shape)
 
-    def ask(x: Array, rate: Varying) -> _Asked:
-        there = Varying(D.value + x, {**D.slopes, BY_TRAVEL: one})
-        found = added({**travel, "D": there, "D_rate": Varying(rate.value, rate.slopes | of_rate)})
+    def ask(x: Array, rate: Varying, by_parameters: bool) -> _Asked:
+        there = {
+            "D": Varying(D.value + x, {**D.slopes, BY_TRAVEL: one}),
+            "D_rate": Varying(rate.value, {**rate.slopes, BY_RATE: one}),
+        }
+        found = added({**travel, **there}, None if by_parameters else (BY_TRAVEL, BY_RATE))
         slopes = {p: np.broadcast_to(slope, one.shape) for p, slope in found.slopes.items()}
         by = (slopes.pop(name, 0.0 * one) for name in (BY_TRAVEL, BY_RATE))
         return _Asked(found.value - x, slopes, *by)
 
-    of_rate = {BY_RATE: one}
     return ask
 
 
@@ -137,8 +142,8 @@ def _kappa(ask: Ask, at: _Asked, settled: Varying, travel: Any) -> Varying:
     """
     rate = travel["D_rate"]
     step, faster = (STEP * (float(np.abs(v.value).max()) or 1.0) for v in (travel["D"], rate))
-    further = ask(settled.value + step, rate)
-    quicker = ask(settled.value, rate + Varying(np.full(settled.value.shape, faster)))
+    further = ask(settled.value + step, rate, True)
+    quicker = ask(settled.value, rate + Varying(np.full(settled.value.shape, faster)), True)
     kappa = at.kappa
     by_place = (further.kappa - kappa) / step
     slopes = {}
@@ -161,19 +166,15 @@ def _weight(kappa: Varying, per_time: Array) -> Varying:
     return Varying(weight, {p: by_kappa * slope for p, slope in kappa.slopes.items()})
 
 
-def _differences(values: Array) -> Array:
-    """From the point before, along each record; 0 at the first."""
-    return np.diff(values, axis=0, prepend=values[:1])
-
-
 def _change(of: Varying) -> Varying:
-    return Varying(_differences(of.value), {p: _differences(v) for p, v in of.slopes.items()})
+    """From the point before, along each record; 0 at the first."""
+    return of + one_point_before(of) * Varying(-np.ones(()))
 
 
 def _turned(speed: Array) -> Array:
     """Changes of crossheads' speeds [mm/s] since the point before where these are corners."""
-    change, size = _differences(speed), np.abs(speed)
-    both = np.maximum(size, np.concatenate([size[:1], size[:-1]]))
+    change, size = speed - shifted(speed), np.abs(speed)
+    both = np.maximum(size, shifted(size))
     return np.where(np.abs(change) > CORNER * both, change, 0.0)
 
 

@@ -171,30 +171,37 @@ class RecordedRig:
         )
 
     def moved(
-        self, travel: Any, variant: FrameVariant, ahead: Varying, values: Mapping[str, float]
+        self,
+        travel: Any,
+        variant: FrameVariant,
+        values: Mapping[str, float],
+        ahead: Varying,
+        faster: Varying | None = None,
     ) -> dict[str, Varying]:
-        """A travel with what a form adds to it, and its rate.
+        """A travel with what a form adds to it, and its rate; found here where it is not given."""
+        if faster is None:
+            faster = self._faster(variant, values, ahead)
+        return {**travel, "D": travel["D"] + ahead, "D_rate": travel["D_rate"] + faster}
+
+    def _faster(
+        self, variant: FrameVariant, values: Mapping[str, float], ahead: Varying
+    ) -> Varying:
+        """How fast what a form adds to the travel changes [mm/s].
 
         By the place or the time alone that is as the form has it, however much changes from one
         point to the next; but for a power, whose rate may be infinite where it begins.
         """
         steep = variant.shape is not None and variant.shape.fixed.get("shape") == "power sides"
-        if variant.remembered is None and set(variant.of) <= set(OF_ITSELF) and not steep:
-            faster = self._faster(variant, values)
-        else:
-            faster = self.per_second(ahead)
-        return {**travel, "D": travel["D"] + ahead, "D_rate": travel["D_rate"] + faster}
-
-    def _faster(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
-        """How fast what a form adds to the travel changes, by the place or the time [mm/s]."""
+        if variant.remembered is not None or not set(variant.of) <= set(OF_ITSELF) or steep:
+            return self.per_second(ahead)
         key = (variant, "faster")
         if key not in self._compiled:
             assert variant.added_travel is not None
             marched = Marched((*variant.of, "speed"), tuple(p.name for p in variant.parameters))
             at = marched.at
-            ahead = variant.added_travel(at, at)
+            added = variant.added_travel(at, at)
             rate = {"displacement": at["speed"], "time": 1.0}
-            faster = sum(derivative_of(ahead, at[name]) * rate[name] for name in variant.of)
+            faster = sum(derivative_of(added, at[name]) * rate[name] for name in variant.of)
             self._compiled[key] = marched.define({"faster": faster}, {})
         known = {"displacement": self.points["D"], "time": self._since_start}
         return self._compiled[key](known | {"speed": self.points["D_rate"]}, values)["faster"]

@@ -6,7 +6,7 @@ forms it is the same, and is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,22 +14,17 @@ import numpy.typing as npt
 
 from ..expressions.marching import Varying
 from ..inference.first_order import SMALL
-from .giving_way import in_series
+from .giving_way import BY_TRAVEL, Added, in_series
 from .picture_frame.variant import FrameVariant
 
 __all__ = ["Slips", "left_by"]
 
 Array = npt.NDArray[np.float64]
-Added = Callable[[Any, Collection[str] | None], Varying]
-"""What is added to a travel [mm], from one, with some derivatives; None: with all there are."""
-
 _Known = tuple[Any, dict[str, float], tuple[Varying, ...]]
 """Forms of a model, its numbers, and what slipped."""
 
 #: Models of which it is kept what slipped.
 MOST = 4
-#: Name of the derivative by the travel, beside those by parameters.
-BY_TRAVEL = "travel"
 #: Share of what was off before that is too much of it.
 LITTLE_NEARER = 0.5
 
@@ -38,9 +33,7 @@ class Slips:
     """What forms that slip added to the travel, beside which forms with which parameters."""
 
     def __init__(self) -> None:
-        self._known: dict[
-            FrameVariant, list[tuple[Any, dict[str, float], tuple[Varying, ...]]]
-        ] = {}
+        self._known: dict[FrameVariant, list[_Known]] = {}
 
     def clear(self) -> None:
         """Forget all, as forces are foretold in another way from now on."""
@@ -78,7 +71,7 @@ class Slips:
                 return known
         found: tuple[Varying, ...]
         if variant.in_series:
-            found = in_series(lambda there: added(there, None), travel, variant.rounds)
+            found = in_series(added, travel, variant.rounds)
         else:
             found = (left_by(added, travel, variant.rounds),)
         before = [one for one in self._known.get(variant, ()) if one[0] != tuple(variants)]

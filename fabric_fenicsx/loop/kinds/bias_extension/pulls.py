@@ -98,6 +98,14 @@ def pulls_of(
     np.maximum.at(stopped, of, wanted[points, of])
     np.maximum.at(longest, of, np.nan_to_num(since[points, of]))
     stops, holds = (np.array([most[own].max() for own in alike]) for most in (stopped, longest))
-    pace = np.exp([own_pace[own].mean() for own in alike])
-    own = own_speed, on_its_way_back, phase, since
-    return Pulls(furthest, pace, back, stops, holds, *own)
+    return Pulls(
+        furthest=furthest,
+        speed=np.exp([own_pace[own].mean() for own in alike]),
+        back=back,
+        stops=stops,
+        holds=holds,
+        own_speed=own_speed,
+        on_its_way_back=on_its_way_back,
+        phase=phase,
+        since=since,
+    )

@@ -275,8 +275,8 @@ def of_the_rig(
     of = [*kind.of, *(name for other in others for name in other.of)]
     of += ["free_length"] * (acts_on == "slip")
     of += ["per_time"] * (turning == "over a way")
-    in_series = acts_on == "travel" and set(of) <= {"force", "time", "run"} and "force" in of
-    in_series &= remembered is None and not turning
+    at_once = remembered is None and not turning and set(of) <= {"force", "time", "run"}
+    in_series = acts_on == "travel" and "force" in of and at_once
     return FrameVariant(
         label,
         parameters,
