@@ -441,6 +441,17 @@ def test_a_picture_may_be_larger_for_long_overhangs():
         assert moved == pytest.approx([0.0, -30.0 * share], abs=1e-6)
 
 
+def test_a_picture_may_be_too_large_all_over():
+    """As where its scale was read off wrongly: places and heights by one share, however deep."""
+    ranges = {"length": 200.0, "curvature": 0.01, "x": 100.0, "z": 90.0}
+    found = {term.name: term for term in terms(ranges, ())}["reading_of_height"]
+    (form,) = (form for form in found.variants if form.label == "picture, even")
+    for z in (-1.0, -80.0):
+        at = {"x": 70.0, "z": z, "length": 200.0}
+        moved = [float(as_ufl(v)) for v in form.camera({"reading_of_height_0": 0.03}, at)]
+        assert moved == pytest.approx([2.1, 0.03 * z])
+
+
 def test_heights_may_be_read_too_low_below_a_glare():
     """By what soon grows no more: of depths, c (1 − e^(−|z|/w)) of the deepest picture."""
     ranges = {"length": LENGTH, "curvature": 0.01, "x": 100.0, "z": 90.0}

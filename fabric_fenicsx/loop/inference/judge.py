@@ -57,6 +57,11 @@ class Model:
     estimate: Estimate
     criterion: float
 
+    @property
+    def over_two(self) -> bool:
+        """Whether it has one effect, over two variables, which is no simpler than one over each."""
+        return len(self.effects) == 1 and self.effects[0].of_two
+
 
 @dataclass(frozen=True, slots=True)
 class Misfit:

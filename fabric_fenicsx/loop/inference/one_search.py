@@ -112,7 +112,7 @@ class Search:
         self.accounted = self.judge.accounts(chosen, baseline)
         self.doubtful_noise = self.judge.doubtful_noise(chosen)
         self.specimens_differ = bool(chosen.fit.deviations)
-        self.may_be_more = self.may_be_one_more(chosen)
+        self.may_be_more = chosen.over_two or self.may_be_one_more(chosen)
         nearest = _nearest(levels)
         # Held-out runs, by which it may be contradicted, do not say whether to look further.
         self.chosen = final if final.effects else chosen
@@ -265,7 +265,7 @@ class Search:
             most = self.most or CRITERIA.most_terms
         for count in range(2, 1 + min(most, len(self.effects))):
             best = _nearest(levels)
-            if not levels[-1] or self._settled(best, levels[0][0]):
+            if not levels[-1] or (self._settled(best, levels[0][0]) and not best.over_two):
                 break
             self.gave_way = self.gives_way(best)
             if self.gave_way:

@@ -63,9 +63,18 @@ class Several:
         """
         self.models.take_noise_from(best.fit)
         self.models.base = self.models.baseline(self.models.base.values)
-        bases = self._bases(count, levels[-1])
+        level, fewer = levels[-1], levels[-1][0]
+        in_its_place = fewer.over_two and self._settled(fewer, levels[0][0])
+        if in_its_place:
+            # Nothing lacks beside it: two over one variable each are looked for.
+            level = [m for m in level if not m.over_two] or level
+        bases = self._bases(count, level)
         self._added_beside |= {frozenset(base.variants) for base in bases}
         levels.append(self._together(count, bases))
+        limit = fewer.criterion + CRITERIA.decisive
+        if in_its_place and not any(m.criterion < limit for m in levels[-1]):
+            levels[-1] = []
+            return
         if self._terms and levels[-1]:
             # Before others take the place of what is only in the wrong form.
             self.in_other_forms(levels)

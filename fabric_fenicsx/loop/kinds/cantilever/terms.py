@@ -303,7 +303,10 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
 
     name = "reading_of_height"
     even = coefficient(f"{name}_0")
-    forms = [form("even", (even,), lambda p, x: p[even.name], "z", "scale")]
+    # A picture that is too large all over is so in x as well, by which a reading is found.
+    forms = [
+        form("even", (even,), lambda p, x: p[even.name], "z", to) for to in ("scale", "picture")
+    ]
     forms += [form(*shape, "z", "scale") for shape in splines(name, SPLINES)]
     forms.append(form(*wave(name), "z", "height"))
     forms.append(form(*saturation(name, DECAYS, 0.02), "z", "height"))
