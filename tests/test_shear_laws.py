@@ -19,6 +19,7 @@ from fabric_fenicsx.mechanics.laws.dashpots import EyringDashpot, LinearDashpot,
 from fabric_fenicsx.mechanics.laws.law import Crossing
 from fabric_fenicsx.mechanics.laws.locking import Locking, SmoothLocking
 from fabric_fenicsx.mechanics.laws.maxwell import Maxwell
+from fabric_fenicsx.mechanics.laws.pressed import PressedFriction
 from fabric_fenicsx.mechanics.laws.sliding import SlidingFriction
 from fabric_fenicsx.mechanics.laws.springs import PolynomialSpring
 from fabric_fenicsx.mechanics.laws.tabulated import TabulatedDashpot, TabulatedSpring
@@ -182,10 +183,24 @@ def test_friction_that_grows_as_the_angle_presses_the_tows_together():
     assert moments(DahlFriction(limit, 0.1, growth=2.0), path) == pytest.approx(M[1:])
 
 
+def test_friction_of_tows_that_shear_presses_together_slides_after_as_much_shear():
+    """m_c (1 + 3 γ²) times Dahl's of limit 1, by hand; its stick keeps M s γ_s/2."""
+    law, past = PressedFriction(limit=2.0, stick_angle=0.1, growth=3.0, power=2.0), 0.0
+    path = [0.05, 0.5, 0.25, -0.5]
+    for old, new, M in zip([0.0, *path], path, moments(law, path), strict=False):
+        end = np.sign(new - old)
+        past = end + (past - end) * np.exp(-abs(new - old) / 0.1)
+        assert pytest.approx(2.0 * (1.0 + 3.0 * new**2) * past, rel=1e-5) == M
+    stored = evaluated(law.energy(as_ufl(path[-1]), {"stick": as_ufl(past)}, number))
+    assert stored == pytest.approx(M * past * 0.1 / 2.0)
+
+
 def test_friction_is_rate_independent():
     """Ten times as fast the moments are the same; those of a dashpot are ten times as large."""
     path = [0.05, 0.2, 0.1]
-    for law in (CoulombFriction(1.0, 0.1), DahlFriction(1.0, 0.1), DahlFriction(1.0, 0.1, 2.0)):
+    pressed = PressedFriction(1.0, 0.1, 2.0, 1.5)
+    dahl = DahlFriction(1.0, 0.1), DahlFriction(1.0, 0.1, 2.0)
+    for law in (CoulombFriction(1.0, 0.1), *dahl, pressed):
         assert moments(law, path) == pytest.approx(moments(law, path, length=0.1))
     slow, fast = (moments(LinearDashpot(7.0), path, length=h) for h in (1.0, 0.1))
     assert fast == pytest.approx(10.0 * slow)
