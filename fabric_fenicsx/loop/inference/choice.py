@@ -40,6 +40,7 @@ def chosen_model(
         # What is left may be due to the form of an effect rather than to another one.
         doubtful = unlike or (terms and judge.doubtful_noise(level[0]))
         doubtful |= bool(count) and beaten and may_be_one_more(level[0])
+        # Nor is a term over two variables simpler than two.
         doubtful |= level[0].over_two
         enough = count and not doubtful and judge.enough(level[0], levels[0][0])
         if beaten and not enough:
