@@ -187,7 +187,7 @@ def test_friction_of_tows_that_shear_presses_together_slides_after_as_much_shear
     """m_c (1 + 3 γ²) times Dahl's of limit 1, by hand; its stick keeps M s γ_s/2."""
     law, past = PressedFriction(limit=2.0, stick_angle=0.1, growth=3.0, power=2.0), 0.0
     path = [0.05, 0.5, 0.25, -0.5]
-    for old, new, M in zip([0.0, *path], path, moments(law, path), strict=False):
+    for (old, new), M in zip(pairwise([0.0, *path]), moments(law, path), strict=True):
         end = np.sign(new - old)
         past = end + (past - end) * np.exp(-abs(new - old) / 0.1)
         assert pytest.approx(2.0 * (1.0 + 3.0 * new**2) * past, rel=1e-5) == M

@@ -8,9 +8,20 @@ from typing import Any
 from ufl import conditional, exp, ge, max_value, min_value
 
 from .coulomb import GROWTH, CoulombFriction, friction_numbers
-from .law import Crossing, Form
+from .law import Crossing, Form, size_of
 
-__all__ = ["DahlFriction"]
+__all__ = ["DahlFriction", "stick_of_limit_one"]
+
+
+def stick_of_limit_one(past: Any, step: Any) -> Any:
+    """S of ds = dx (1 − s sign dx), Dahl's friction of limit 1, exactly.
+
+    Args:
+        past: s at first.
+        step: by how much x, the shear over that of the stick, changes.
+    """
+    kept, sign = exp(-size_of(step)), conditional(ge(step, 0), 1.0, -1.0)
+    return kept * past + (1 - kept) * sign
 
 
 @dataclass(frozen=True)

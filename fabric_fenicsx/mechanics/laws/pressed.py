@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from ufl import conditional, exp, ge
-
 from ...inputs.groups import NotNegative
 from ...inputs.parameters import Parameter
 from .coulomb import GROWTH, friction_numbers
+from .dahl import stick_of_limit_one
 from .law import Crossing, CrossingLaw, Form, in_degrees, number, per_area, size_of
 from .shapes import LEAST
 
@@ -72,7 +71,4 @@ class PressedFriction(CrossingLaw):
         return number(self.limit) * (1 + grown)
 
     def _stick(self, at: Crossing) -> Any:
-        """±1 + (s_n ∓ 1) exp(−|Δγ|/γ_s)."""
-        step = at.change / at.number(self.stick_angle)
-        end = conditional(ge(step, 0), 1.0, -1.0)
-        return end + (at.past("stick") - end) * exp(-size_of(step))
+        return stick_of_limit_one(at.past("stick"), at.change / at.number(self.stick_angle))

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Self
 
-from ufl import conditional, exp, ge, gt, lt, max_value, min_value
+from ufl import conditional, ge, gt, lt, max_value, min_value
 
 from ...inputs.groups import NotNegative, Positive
+from .dahl import stick_of_limit_one
 from .law import Crossing, CrossingLaw, each, in_degrees, number, per_area, signed, size_of
 from .shapes import LEAST, Course, Kind, product_of, shape_of
 from .variables import AT_HAND, VARIABLES, Also, Variable, at_rest, way
@@ -259,9 +260,7 @@ class ShapedLaw(CrossingLaw):
     def _stick(self, at: Crossing) -> Any:
         """The moment of a friction over its limit."""
         if self.base == "smooth":
-            step = at.change / at.number(self.stick_angle)
-            kept, sign = exp(-size_of(step)), conditional(ge(step, 0), 1.0, -1.0)
-            return kept * at.past("stick") + (1 - kept) * sign
+            return stick_of_limit_one(at.past("stick"), at.change / at.number(self.stick_angle))
         if self.base == "flowing":
             # Half of the flow before what bends the stick, half behind: of second order in Δt.
             stick, n = at.number(self.stick_angle), at.number(self.exponent)
