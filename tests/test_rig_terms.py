@@ -234,6 +234,16 @@ def turned_sheet(t, D, speed, run):
     return force_of(D, speed) + m * FABRIC**2 / (FRAME * np.sin(theta))
 
 
+def another_range(t, D, speed, run):
+    """In the third run the cell's amplifier stood on one that reads a tenth more."""
+    return force_of(D, speed) * (1.1 if run == 2 else 1.0)
+
+
+def humid_day(t, D, speed, run):
+    """In the third run the dashpot is half as large again."""
+    return force_of(D, speed) + (0.5 * (force_of(D, speed) - force_of(D, 0.0 * D))) * (run == 2)
+
+
 @pytest.mark.parametrize(
     ("measured", "term", "label", "numbers"),
     [
@@ -241,6 +251,8 @@ def turned_sheet(t, D, speed, run):
         (turned_spring, "elastic_moment_of_run", "by turns", 4),
         (turned_sheet, "even_moment_of_angle_and_run", "2 coefficients, to and fro", 5),
         (changed_cell, "reading_of_force_and_run", "gain, step", 5),
+        (another_range, "reading_of_force_and_run", "gain, run 3 alone", 4),
+        (humid_day, "viscous_moment_of_run", "run 3 alone", 4),
     ],
 )
 def test_what_is_so_at_some_runs(tmp_path, measured, term, label, numbers):
@@ -599,12 +611,15 @@ def test_numbers_of_a_file_are_python_s():
         ("travel_of_run", "linear"),
         ("elastic_moment_of_run", "saturation"),
         ("elastic_moment_of_run", "step"),
+        ("viscous_moment_of_run", "run 3 alone"),
         ("viscous_moment_of_run", "2 coefficients"),
         ("reading_of_force_and_run", "gain, by turns"),
+        ("reading_of_force_and_run", "gain, run 3 alone"),
         ("travel_of_displacement_and_run", "by turns, powers 1"),
         ("odd_moment_of_angle_and_run", "2 coefficients, from run to run"),
         ("even_moment_of_angle_and_run", "linear, to and fro"),
         ("even_moment_of_angle_and_run", "3 coefficients, step"),
+        ("odd_moment_of_angle_and_run", "linear, run 3 alone"),
         ("lagging_moment_of_angle_and_history", "linear, play"),
         ("lagging_moment_of_angle_history_and_time", "linear"),
         ("lagging_moment_of_rate_and_history", "saturation"),

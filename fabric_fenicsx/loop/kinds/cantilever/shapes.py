@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from math import pi
 from typing import Any
 
@@ -202,16 +203,23 @@ def over_runs(name: str, last: float, *, constant: bool = False) -> Iterator[Dra
 
     slow = Parameter(f"{name}_width", (SLOW,), SHARP / last, 0.5)
 
-    def stepping(width: Parameter | float) -> Of:
+    def from_one_on(width: Parameter | float) -> Of:
         def step(p: Values, x: Any) -> Any:
             own = _shape("step", p, (one,), p[place.name], valued(width, p), x)
             return sum(p[c.name] for c in zero) + own
 
         return step
 
-    yield "step", (*zero, one, place), stepping(SHARP / last)
+    def in_one(p: Values, x: Any, k: int) -> Any:
+        coefficients = [p[one.name] if k == r else 0.0 for r in range(int(last) + 1)]
+        return sum(p[c.name] for c in zero) + shape_of("each", coefficients, x)
+
+    yield "step", (*zero, one, place), from_one_on(SHARP / last)
     if last >= FEWEST_TO_CHANGE:
-        yield "slow step", (*zero, one, place, slow), stepping(slow)
+        yield "slow step", (*zero, one, place, slow), from_one_on(slow)
+        # Neither the first nor the last one: a step is what is so in either of these.
+        for k in range(1, int(last)):
+            yield f"run {k + 1} alone", (*zero, one), partial(in_one, k=k)
 
 
 def by_turns(name: str, last: float, *, constant: bool = False) -> Iterator[Drawn]:

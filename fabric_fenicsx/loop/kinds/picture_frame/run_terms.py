@@ -20,7 +20,7 @@ from ....mechanics.laws.shapes import shape_of
 from ....mechanics.laws.springs import PolynomialSpring
 from ...inference.effects import Effect, Shape, Values, valued
 from ..records import FEWEST_BEFORE, FEWEST_BY_TURNS, SHARP, between_runs
-from .shapes import X, factor, fitted, moment_shape, over_runs, shapes
+from .shapes import X, factor, fitted, moment_shape, one_alone, over_runs, shapes
 from .terms import remembering
 from .variant import FrameVariant
 
@@ -95,6 +95,8 @@ def _shares(name: str, last: float) -> Iterator[tuple[str, dict[str, Any]]]:
     place = Parameter(f"{name}_place", between_runs(last), 0.0, 1.0)
     step = {"shape": "step", "coefficients": (1.0,), "place": place, "width": SHARP / last}
     yield "step", step
+    for label, coefficients in one_alone(1.0, last):
+        yield label, {"shape": "each", "coefficients": coefficients}
 
 
 def _by_the_angle(name: str, base: str, last: float, reach: float) -> Iterator[FrameVariant]:

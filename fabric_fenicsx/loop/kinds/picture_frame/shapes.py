@@ -33,6 +33,7 @@ __all__ = [
     "moment_shape",
     "moving",
     "of_powers",
+    "one_alone",
     "over",
     "over_runs",
     "product",
@@ -455,3 +456,15 @@ def over_runs(name: str, last: float) -> Iterator[Drawn]:
     yield "by turns", (0.0, one), {"shape": "periodic", "width": 2.0 / last}
     place = Parameter(f"{name}_place", tuple(between_runs(last)), 0.0, 1.0)
     yield "step", (one,), {"shape": "step", "place": place, "width": SHARP / last}
+    for label, coefficients in one_alone(one, last):
+        yield label, coefficients, {"shape": "each"}
+
+
+def one_alone(much: Coefficient, last: float) -> Iterator[tuple[str, tuple[Coefficient, ...]]]:
+    """What is so in one run that is neither the first nor the last one: coefficients of "each".
+
+    A step from one run to the next is what is so in either of these.
+    """
+    count = int(last) + 1
+    for k in range(1, count - 1):
+        yield f"run {k + 1} alone", tuple(much if k == r else 0.0 for r in range(count))
