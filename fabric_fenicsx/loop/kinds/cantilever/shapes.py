@@ -217,8 +217,7 @@ def over_runs(name: str, last: float, *, constant: bool = False) -> Iterator[Dra
     yield "step", (*zero, one, place), from_one_on(SHARP / last)
     if last >= FEWEST_TO_CHANGE:
         yield "slow step", (*zero, one, place, slow), from_one_on(slow)
-        # Neither the first nor the last one: a step is what is so in either of these.
-        for k in range(1, int(last)):
+        for k in range(int(last) + 1):
             yield f"run {k + 1} alone", (*zero, one), partial(in_one, k=k)
 
 

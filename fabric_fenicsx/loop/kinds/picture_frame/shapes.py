@@ -461,10 +461,7 @@ def over_runs(name: str, last: float) -> Iterator[Drawn]:
 
 
 def one_alone(much: Coefficient, last: float) -> Iterator[tuple[str, tuple[Coefficient, ...]]]:
-    """What is so in one run that is neither the first nor the last one: coefficients of "each".
-
-    A step from one run to the next is what is so in either of these.
-    """
+    """What is so in one of the runs: label, and coefficients of a shape "each"."""
     count = int(last) + 1
-    for k in range(1, count - 1):
+    for k in range(count):
         yield f"run {k + 1} alone", tuple(much if k == r else 0.0 for r in range(count))
