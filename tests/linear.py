@@ -62,6 +62,7 @@ class Linear:
     test, quantity, notes, one_curve = "linear", "force_N", (), None
     curves_only = each_its_own_way = False
     in_copies = True
+    settles = False
     alike = frozenset()
     imitated = MappingProxyType({})
 

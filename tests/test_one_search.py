@@ -13,6 +13,7 @@ from fabric_fenicsx.loop.inference import one_search, several
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
 from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.in_common import InCommon
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.models import Models
 from fabric_fenicsx.loop.inference.noise import Noise
@@ -104,6 +105,27 @@ def test_a_model_is_weighed_by_what_its_fit_has_got_to(monkeypatch):
     last = models.refined(at_first)
     assert last.criterion > there.criterion + 100.0
     assert models.refined(last).criterion == pytest.approx(last.criterion)
+
+
+@pytest.mark.parametrize("settles", [False, True])
+def test_searches_of_one_test_make_the_same_once(settles):
+    """But of one whose predictions get better; and with other noise it is not the same."""
+    shapes = {"hump": lambda t: t * (1.0 - t), "bend": lambda t: t**2}
+    test = made(shapes, shapes["hump"], [linear_effect(name) for name in shapes])
+    test.settles = settles
+    common = InCommon(test)
+    every, one = (Models(test, effects, common) for effects in (test.effects, test.effects[1:]))
+    assert (every.base is one.base) is not settles
+    (effect,) = one.effects
+    own = [models.signed(models.effects)[effect] for models in (every, one)]
+    assert (own[0] is own[1]) is not settles
+    found = [models.fitted(one_search.by_itself(own[0]), starts=1)[0] for models in (every, one)]
+    assert (found[0] is found[1]) is not settles
+    assert found[0].values == found[1].values and found[0].variants == effect.variants
+    assert set(one.forms) == {frozenset({effect})}, "whoever made it"
+    one.variances = Variances(Noise(0.5))
+    louder = one.fitted(one_search.by_itself(own[0]), starts=1)[0]
+    assert louder.variances is one.variances
 
 
 def of_two_bends():

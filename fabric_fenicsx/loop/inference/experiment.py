@@ -223,6 +223,11 @@ class Experiment(Protocol):
         ...
 
     @property
+    def settles(self) -> bool:
+        """Whether predictions are approximate, and better after settle was called."""
+        ...
+
+    @property
     def imitated(self) -> Mapping[str, Sequence[str]]:
         """Names of terms that do nearly what a candidate does, tried beside it, by its name."""
         ...

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from .experiment import Experiment, each_by_itself
 from .first_order import Combination, Signature, ToFirstOrder
 from .fitted import Fit, soft_size
 from .fitting import fit, parameters_of
+from .in_common import InCommon, numbers_of
 from .judge import Judge, Model
 from .noise import Noise, estimated_noise
 from .ranking import cancelling, nearest_forms, nothing_left, simplest_first
@@ -46,6 +48,7 @@ class Models:
     Args:
         experiment: the test.
         effects: that may be in a model.
+        common: to all that fit models of this test; by default to this one alone.
 
     Attributes:
         judge: that weighs them.
@@ -54,8 +57,14 @@ class Models:
         forms: fits by the effects in them.
     """
 
-    def __init__(self, experiment: Experiment, effects: Sequence[Effect]) -> None:
+    def __init__(
+        self,
+        experiment: Experiment,
+        effects: Sequence[Effect],
+        common: InCommon | None = None,
+    ) -> None:
         self.experiment, self.effects = experiment, list(effects)
+        self.common = common or InCommon(experiment)
         self.judge = Judge(experiment, self.effects)
         self.forms: dict[frozenset[Effect], list[Fit]] = {}
         #: Sensitivities of the baseline to forms that were looked at.
@@ -99,7 +108,9 @@ class Models:
                 f"{int(rows.sum())} readings to fit"
                 + (f"; at {unknown} others the rate of the motion is not known" if unknown else "")
             )
-        return fit(self.experiment, (), start, rows, self.variances)
+        numbers = ("baseline", tuple(start.items()), rows.tobytes(), numbers_of(self.variances))
+        make = partial(fit, self.experiment, (), start, rows, self.variances)
+        return self.common(numbers, (), make)
 
     def take_noise_from(self, fitted: Fit) -> None:
         """Take noise and scatter from a model with a smooth line for what it misses."""
@@ -147,7 +158,8 @@ class Models:
 
         See fit_combinations.
         """
-        every = fit_combinations(
+        make = partial(
+            fit_combinations,
             self.experiment,
             base or self.base,
             combinations,
@@ -157,6 +169,13 @@ class Models:
             kind=self._effects_in,
             robust=CRITERIA.far,
         )
+        if base is not None:
+            every = make()
+        else:
+            added = [part for one in combinations for form in one for part in form]
+            sizes = tuple(map(len, combinations))
+            numbers = ("with effects", starts, most, sizes, numbers_of(self.variances))
+            every = self.common(numbers, (self.base, *added), make)
         found = [model for model in every if not cancelling(model)]
         for model in found:
             effects = frozenset(self.effects_of(model))
@@ -200,7 +219,13 @@ class Models:
 
     def signed(self, effects: Sequence[Effect]) -> Signatures:
         """The baseline's sensitivities to each form of some effects; see beside.signed."""
-        found = signed(self.experiment, self.base, effects)
+        base = self.base
+
+        def made(some: Sequence[Effect]) -> list[Mapping[Variant, Sequence[Signature]]]:
+            return list(signed(self.experiment, base, some).values())
+
+        own = self.common.of_each(("signatures",), (base,), effects, made)
+        found = dict(zip(effects, own, strict=True))
         self._known |= {v: own for forms in found.values() for v, own in forms.items()}
         return found
 

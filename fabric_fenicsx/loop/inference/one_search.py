@@ -24,6 +24,7 @@ from .effects import Effect
 from .experiment import Experiment
 from .first_order import ToFirstOrder
 from .fitted import Fit
+from .in_common import InCommon
 from .judge import Model
 from .models import Models
 from .noise import quantum
@@ -48,6 +49,7 @@ class Search:
         most: effects in one model; by default as many as there may be.
         rival: a model of others that leaves noise: what is far behind that in the form that is
             likely to be its best is not tried in others.
+        common: to all searches of this test.
     """
 
     def __init__(
@@ -57,6 +59,7 @@ class Search:
         progress: Callable[[float, str], None],
         most: int | None = None,
         rival: Fit | None = None,
+        common: InCommon | None = None,
     ) -> None:
         self.experiment, self.progress = experiment, progress
         self.effects, self.most = [e for e in effects if not e.of_two], most
@@ -65,7 +68,7 @@ class Search:
         self._of_two = [e for e in effects if e.of_two]
         # With what has no formula there are too many to fit them all.
         self._screened_first = any(not effect.listed for effect in effects)
-        self.models = Models(experiment, effects)
+        self.models = Models(experiment, effects, common)
         self.judge = self.models.judge
         #: Whether the chosen model leaves noise in the fitted readings; holdout runs have no say.
         self.accounted = False

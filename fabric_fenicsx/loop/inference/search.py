@@ -19,6 +19,7 @@ from .diagnosis import Diagnosis
 from .effects import Effect
 from .experiment import Experiment
 from .fitted import Fit
+from .in_common import InCommon
 from .judge import Model
 from .one_search import Search
 from .ranking import nearest_forms
@@ -43,10 +44,12 @@ def diagnose_test(
         SolveError: the baseline could not be fitted.
     """
     listed = [e for e in experiment.effects if names is None or e.name in names]
-    search = Search(experiment, listed, progress)
+    common = InCommon(experiment)
+    search = Search(experiment, listed, progress, common=common)
     if names is not None or not experiment.terms:
         return search.run()
-    further = Search(experiment, [*listed, *experiment.terms], progress, most=1)
+    every = [*listed, *experiment.terms]
+    further = Search(experiment, every, progress, most=1, common=common)
     # One term is less than several effects, and sooner found.
     search.gives_way = further.finds_what_several_do_not
     found = search.run()
@@ -121,7 +124,8 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
     single, other, least = further, further.found, doubt.least
     if len(chosen.effects) < 2 or other is None:
         rival = _that_leaves_noise(search)
-        single = Search(search.experiment, doubt.terms, search.progress, most=1, rival=rival)
+        of = search.experiment, doubt.terms, search.progress
+        single = Search(*of, most=1, rival=rival, common=search.models.common)
         other = single.run()
     search.judge.compared = True
     final = search.judge.weighed(chosen.fit, chosen.effects)

@@ -55,6 +55,7 @@ class CrossheadTest:
     notes: Sequence[str] = ()
     terms_are_rivals = False
     in_copies = True
+    settles = False
     #: Whether what gives way with the force is found with the force and the rate that it leaves.
     gives_way = True
     each_its_own_way = False

@@ -19,7 +19,7 @@ another speed after a corner, by ΔḊ, y has jumped there by −κ ΔḊ.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,6 +46,8 @@ LEAST_FREE = 0.2
 AT_ONCE = 1e-2
 #: Share of the largest travel, and speed, by which these differ where κ is asked for again.
 STEP = 1e-6
+#: Share of the largest travel below which a step of Newton's is the last one.
+LAST = 1e-10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,8 +77,8 @@ class _Asked:
         return -self.by_rate / self.free
 
 
-Ask = Callable[[Array, Varying, bool], _Asked]
-"""G at an x and a rate, by the parameters as well or by the travel and its rate alone."""
+Ask = Callable[[Array, Varying], _Asked]
+"""G at an x and a rate."""
 
 
 def in_series(added: Added, travel: Any, rounds: int) -> tuple[Varying, Varying]:
@@ -88,15 +90,18 @@ def in_series(added: Added, travel: Any, rounds: int) -> tuple[Varying, Varying]
     Args:
         added: g.
         travel: at all points, with "per_time".
-        rounds: steps, for y and for x.
+        rounds: most steps, for y and for x.
     """
     V, per_time = travel["D_rate"], travel["per_time"].value
-    ask = _asking(added, travel)
+    ask, least = _asking(added, travel), LAST * float(np.abs(travel["D"].value).max())
     y = np.zeros(travel["D"].value.shape)
+    at = ask(y, V)
     for _ in range(rounds):
-        at = ask(y, V, False)
-        y = y + at.off / at.free
-    at = ask(y, V, True)
+        step = at.off / at.free
+        if np.abs(step).max() < least:
+            break
+        y = y + step
+        at = ask(y, V)
     settled = Varying(y, {p: slope / at.free for p, slope in at.slopes.items()})
     kappa = _kappa(ask, at, settled, travel)
     corners = Varying(_turned(V.value) * per_time)
@@ -107,13 +112,14 @@ def in_series(added: Added, travel: Any, rounds: int) -> tuple[Varying, Varying]
     begins = np.zeros((len(y), 1))
     begins[0] = 1.0
     x = y * (1.0 - begins)
-    for k in range(rounds):
-        at = ask(x, V + rest + weight * _change(Varying(x)), k == rounds - 1)
+    for _ in range(rounds):
+        at = ask(x, V + rest + weight * _change(Varying(x)))
         matrix = at.free - at.by_rate * weight.value, at.by_rate * weight.value
-        x = x + _solved(matrix, at.off * (1.0 - begins))
-    found = Varying(
-        x, {p: _solved(matrix, slope * (1.0 - begins)) for p, slope in at.slopes.items()}
-    )
+        step, *slopes = _solved(matrix, [(1.0 - begins) * r for r in (at.off, *at.slopes.values())])
+        x = x + step
+        if np.abs(step).max() < least:
+            break
+    found = Varying(x, dict(zip(at.slopes, slopes, strict=True)))
     return found, rest + weight * _change(found)
 
 
@@ -121,12 +127,12 @@ def _asking(added: Added, travel: Any) -> Ask:
     D = travel["D"]
     one = np.ones(D.value.shape)
 
-    def ask(x: Array, rate: Varying, by_parameters: bool) -> _Asked:
+    def ask(x: Array, rate: Varying) -> _Asked:
         there = {
             "D": Varying(D.value + x, {**D.slopes, BY_TRAVEL: one}),
             "D_rate": Varying(rate.value, {**rate.slopes, BY_RATE: one}),
         }
-        found = added({**travel, **there}, None if by_parameters else (BY_TRAVEL, BY_RATE))
+        found = added({**travel, **there}, None)
         slopes = {p: np.broadcast_to(slope, one.shape) for p, slope in found.slopes.items()}
         by = (slopes.pop(name, 0.0 * one) for name in (BY_TRAVEL, BY_RATE))
         return _Asked(found.value - x, slopes, *by)
@@ -142,8 +148,8 @@ def _kappa(ask: Ask, at: _Asked, settled: Varying, travel: Any) -> Varying:
     """
     rate = travel["D_rate"]
     step, faster = (STEP * (float(np.abs(v.value).max()) or 1.0) for v in (travel["D"], rate))
-    further = ask(settled.value + step, rate, True)
-    quicker = ask(settled.value, rate + Varying(np.full(settled.value.shape, faster)), True)
+    further = ask(settled.value + step, rate)
+    quicker = ask(settled.value, rate + Varying(np.full(settled.value.shape, faster)))
     kappa = at.kappa
     by_place = (further.kappa - kappa) / step
     slopes = {}
@@ -178,11 +184,11 @@ def _turned(speed: Array) -> Array:
     return np.where(np.abs(change) > CORNER * both, change, 0.0)
 
 
-def _solved(matrix: tuple[Array, Array], right: Array) -> Array:
-    """Solution of a system with a diagonal, and one of the points before, of each record."""
+def _solved(matrix: tuple[Array, Array], right: Sequence[Array]) -> list[Array]:
+    """Solutions of a system with a diagonal, and one of the points before, of each record."""
     own, before = matrix
-    found = np.empty(own.shape)
-    for r in range(own.shape[1]):
-        banded = np.stack([own[:, r], np.append(before[1:, r], 0.0)])
-        found[:, r] = solve_banded((1, 0), banded, right[:, r], check_finite=False)
-    return found
+    before = np.concatenate([np.zeros_like(before[:1]), before[1:]])
+    banded = np.stack([own.T.ravel(), np.append(before.T.ravel()[1:], 0.0)])
+    every = np.column_stack([r.T.ravel() for r in right])
+    found = solve_banded((1, 0), banded, every, check_finite=False)
+    return [one.reshape(own.T.shape).T for one in found.T]

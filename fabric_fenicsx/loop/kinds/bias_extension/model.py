@@ -77,6 +77,7 @@ class BiasExtension(CrossheadTest):
     listed = BIAS_EXTENSION_EFFECTS
     one_curve = None
     curves_only = False
+    settles = True
     # It takes a dozen predictions of the force.
     gives_way = False
     # Each of its readings is of crossings at many angles: laws of other variables look more alike.

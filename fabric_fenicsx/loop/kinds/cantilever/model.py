@@ -88,6 +88,7 @@ class Cantilever:
     curves_only = False
     terms_are_rivals = False
     in_copies = True
+    settles = False
     # A camera that is turned sees a strip that is tilted, but for how that bends; a picture that is
     # too large, or larger for some overhangs, a strip that bends more than it does.
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType(

@@ -92,7 +92,7 @@ class Drape:
     baseline: tuple[Parameter, ...] = ()
     one_curve = None
     curves_only = False
-    terms_are_rivals = in_copies = False
+    terms_are_rivals = in_copies = settles = False
     each_its_own_way = False
     imitated: Mapping[str, tuple[str, ...]] = MappingProxyType({})
     alike: frozenset[str] = frozenset()
