@@ -343,6 +343,16 @@ def hunting_supply(t, D, speed, run):
     return force_of(D, speed) * (1.0 + 0.1 * np.sin(2.0 * np.pi * t / 47.0))
 
 
+def loose_rack(t, D, speed, run):
+    """Play of 0.4 mm, taken up at first, that is gone through within 5 mm of the way back."""
+    behind = np.zeros_like(D)
+    for k in range(1, len(D)):
+        step = D[k] - D[k - 1]
+        behind[k] = (step < 0.0) + (behind[k - 1] - (step < 0.0)) * np.exp(-abs(step) / 5.0)
+    turning = np.abs(speed) * ((speed < 0.0) - behind) / 5.0
+    return force_of(D + 0.4 * behind, speed + 0.4 * turning)
+
+
 def worn_rack(t, D, speed, run):
     """Play of 0.4 mm at the end of the travel, and none at its beginning, taken up within 5 mm."""
     way = np.zeros_like(D)
@@ -363,6 +373,7 @@ def worn_rack(t, D, speed, run):
         (switched_heater, "viscous_moment_of_time", "time, periodic, 2 overtones"),
         (hunting_supply, "reading_of_force_and_time", "gain, periodic"),
         (worn_rack, "travel_of_displacement_and_direction", "linear, over a way"),
+        (loose_rack, "travel_of_displacement_and_direction", "linear, on the way back"),
     ],
 )
 def test_what_two_variables_make_together_leaves_noise(tmp_path, measured, term, label):
@@ -629,6 +640,7 @@ def test_numbers_of_a_file_are_python_s():
         ("travel_of_displacement_and_force", "linear, powers 1"),
         ("reading_of_force_and_rate", "gain, linear"),
         ("travel_of_displacement_and_direction", "linear, over a way"),
+        ("travel_of_force_and_direction", "linear, on the way back"),
         ("dissipative_moment_of_time", "time, window"),
         ("odd_moment_of_angle", "angle, two bumps"),
         ("odd_moment_of_angle", "angle, step, elastic"),

@@ -57,9 +57,12 @@ LAGS = (0.003, 0.01, 0.05, 0.2)
 #: Ways over which a play is taken up, as shares of the largest displacement.
 PLAYS = (0.01, 0.05)
 
-Turning = Literal["", "at its rate", "kept in a hold", "over a way"]
+Turning = Literal["", "at its rate", "kept in a hold", "over a way", "on the way back"]
 """Whether what is added has the sign of the motion, and what that is where nothing moves or, as of
-a play, where it has just turned."""
+a play, where it has just turned. A play that is taken up at first is seen on the way back alone."""
+
+ALONG_A_WAY: tuple[Turning, ...] = ("over a way", "on the way back")
+"""Where it turns as the crosshead goes on."""
 
 
 SLIP_SHAPES = ("linear", "2 coefficients", "3 coefficients", "corner", "saturation")
@@ -73,7 +76,7 @@ AGAINST_THE_MOTION = ("displacement", "force", "time", "run")
 
 WAYS: dict[str, tuple[Turning, ...]] = {
     "reading": ("kept in a hold", "at its rate"),
-    "travel": ("over a way",),
+    "travel": ALONG_A_WAY,
 }
 """How that turns: a frame that goes on at once would have to be infinitely fast."""
 
@@ -176,7 +179,7 @@ def _forms(
             also["memory"] = memory_of(name, largest, *shares)
         if turning:
             also |= {"turning": turning, "slow": SLOW * largest["speed"]}
-        if turning == "over a way":
+        if turning in ALONG_A_WAY:
             starts = tuple(share * largest["displacement"] for share in PLAYS)
             also["way"] = Parameter(f"{name}_way_mm", starts, starts[0] / 10.0, 5.0 * starts[-1])
         if gain:
@@ -238,7 +241,7 @@ def of_the_rig(
         memory: τ of a variable that forgets [s], or the parameter that is one.
         turning: whether that is times the sign of the speed; "kept in a hold" is as it was before,
             as of a friction that sticks, "at its rate" nothing; "over a way" it turns as the
-            crosshead goes on.
+            crosshead goes on, "on the way back" from nothing to one and back again.
         slow: speed below which its sign is rounded, or it holds [mm/s].
         way: over which it turns [mm], or the parameter that is one.
         gain: whether it is a share of the force that is added.
@@ -250,10 +253,12 @@ def of_the_rig(
     remembered: Callable[[Values, Values, Any], Any] | None = None
     if turning == "kept in a hold":
         remembered = partial(_last_way, slow)
-    elif turning == "over a way":
+    elif turning in ALONG_A_WAY:
+        out = 1.0 if turning == "over a way" else 0.0
+        back = -1.0 if turning == "over a way" else 1.0
 
         def remembered(p: Values, at: Values, past: Any) -> Any:
-            return _turned_over(valued(way, p), at, past)
+            return _turned_over(valued(way, p), at, past, out, back)
 
     elif kind.remembered is not None:
         own = kind.remembered
@@ -265,7 +270,7 @@ def of_the_rig(
         size = added(p, kind.value(at), *(other.value(at) for other in others))
         if gain:
             return at["force"] * size
-        if turning in ("kept in a hold", "over a way"):
+        if turning == "kept in a hold" or turning in ALONG_A_WAY:
             return size * at["memory"]
         return size * shape_of("sign", (1.0,), at["speed"], width=slow) if turning else size
 
@@ -274,7 +279,7 @@ def of_the_rig(
 
     of = [*kind.of, *(name for other in others for name in other.of)]
     of += ["free_length"] * (acts_on == "slip")
-    of += ["per_time"] * (turning == "over a way")
+    of += ["per_time"] * (turning in ALONG_A_WAY)
     at_once = remembered is None and not turning and set(of) <= {"force", "time", "run"}
     in_series = acts_on == "travel" and "force" in of and at_once
     return FrameVariant(
@@ -323,11 +328,11 @@ def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
     return conditional(gt(size_of(at["speed"]), slow), way, past)
 
 
-def _turned_over(way: Any, at: Values, past: Any) -> Any:
-    """From the one sign to the other along e^(−ΔD/way), and as it was in a hold."""
+def _turned_over(way: Any, at: Values, past: Any, out: float, back: float) -> Any:
+    """From what it is out to what it is back along e^(−ΔD/way), and as it was in a hold."""
     step = at["speed"] / (at["per_time"] * way)
-    kept, sign = exp(-size_of(step)), conditional(gt(step, 0), 1.0, -1.0)
-    return kept * past + (1 - kept) * sign
+    kept, end = exp(-size_of(step)), conditional(gt(step, 0), out, back)
+    return kept * past + (1 - kept) * end
 
 
 def _zero(name: str, turning: Turning) -> dict[str, Parameter]:
@@ -367,12 +372,13 @@ def _added(
         return
     constant = _zero(name, turning)
     # Of an acceleration there are few readings.
-    seldom = turning in ("kept in a hold", "over a way") or variable == "acceleration"
+    along = turning in ALONG_A_WAY
+    seldom = along or turning == "kept in a hold" or variable == "acceleration"
     few = 2 if seldom else wealth(name.partition("_")[0], variable)
     for label, coefficients, numbers in over(variable, name, few, reach):
         yield label, numbers | {"coefficients": coefficients} | constant
     goes_on = variable in CYCLES and not turning
-    if goes_on or (variable, turning) == ("displacement", "over a way"):
+    if goes_on or (along and variable == "displacement"):
         for label, coefficients, numbers in (*bumps(name, between), *two_bumps(name, between)):
             yield label, numbers | {"coefficients": coefficients} | constant
     if goes_on:
