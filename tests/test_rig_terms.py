@@ -373,7 +373,7 @@ def worn_rack(t, D, speed, run):
         (switched_heater, "viscous_moment_of_time", "time, periodic, 2 overtones"),
         (hunting_supply, "reading_of_force_and_time", "gain, periodic"),
         (worn_rack, "travel_of_displacement_and_direction", "linear, over a way"),
-        (loose_rack, "travel_of_displacement_and_direction", "linear, on the way back"),
+        (loose_rack, "travel_of_speed", "on the way back"),
     ],
 )
 def test_what_two_variables_make_together_leaves_noise(tmp_path, measured, term, label):
@@ -383,7 +383,7 @@ def test_what_two_variables_make_together_leaves_noise(tmp_path, measured, term,
     leaves_noise(experiment, found, 1.3, 1.4)
     acts_on, _, of = term.partition("_of_")
     for variable in {*of.split("_and_")} - {"direction", "rate", "time"}:
-        richest = ("5 coefficients", "gain, 2 coefficients", "2 coefficients")
+        richest = ("5 coefficients", "gain, 2 coefficients", "2 coefficients", "sign")
         one = one_of(experiment, f"{acts_on}_of_{variable}", *richest)
         assert nearest(experiment, one).rms(experiment.readings.fit) > 1.5 * NOISE, variable
 
@@ -641,6 +641,7 @@ def test_numbers_of_a_file_are_python_s():
         ("reading_of_force_and_rate", "gain, linear"),
         ("travel_of_displacement_and_direction", "linear, over a way"),
         ("travel_of_force_and_direction", "linear, on the way back"),
+        ("travel_of_speed", "on the way back"),
         ("dissipative_moment_of_time", "time, window"),
         ("odd_moment_of_angle", "angle, two bumps"),
         ("odd_moment_of_angle", "angle, step, elastic"),

@@ -111,6 +111,8 @@ def rig_terms(
                 own = [*_of_each_specimen(name, specimens)]
                 # What is so at every other run may be another specimen at every other one.
                 forms = own + [form for form in forms if not (own and form.label == "by turns")]
+            if name == "travel_of_speed":
+                forms += _plays(name, largest)
             if name == "reading_of_force":
                 forms += _forms(acts_on, name, "force_size", largest, ends, gain=True)
             if name == "reading_of_speed":
@@ -177,11 +179,7 @@ def _forms(
         if "per_time" in RIG_VARIABLES[variable].of and variable != "way":
             shares = LAGS if variable.endswith("lag") else ()
             also["memory"] = memory_of(name, largest, *shares)
-        if turning:
-            also |= {"turning": turning, "slow": SLOW * largest["speed"]}
-        if turning in ALONG_A_WAY:
-            starts = tuple(share * largest["displacement"] for share in PLAYS)
-            also["way"] = Parameter(f"{name}_way_mm", starts, starts[0] / 10.0, 5.0 * starts[-1])
+        also |= _turned(name, turning, largest)
         if gain:
             label, also["gain"] = f"gain, {label}", True
         y = "share_of_reading" if gain else Y[acts_on]
@@ -198,6 +196,30 @@ def _forms(
             gain=gain,
             shape=Shape(X[variable], y, reach, partial(factor, own), own | also, between),
         )
+
+
+def _turned(name: str, turning: Turning, largest: Mapping[str, float]) -> dict[str, Any]:
+    """Numbers of how what is added turns with the motion."""
+    if not turning:
+        return {}
+    numbers = {"turning": turning, "slow": SLOW * largest["speed"]}
+    if turning in ALONG_A_WAY:
+        starts = tuple(share * largest["displacement"] for share in PLAYS)
+        way = Parameter(f"{name}_way_mm", starts, starts[0] / 10.0, 5.0 * starts[-1])
+        return numbers | {"way": way}
+    return numbers
+
+
+def _plays(name: str, largest: Mapping[str, float]) -> Iterator[FrameVariant]:
+    """As of a rack with the same play all along."""
+    reach = largest["displacement"]
+    for turning in ALONG_A_WAY:
+        own = {"shape": "spline", "coefficients": (), **_zero(name, turning)}
+        also = _turned(name, turning, largest)
+        every = own | also | {"variable": "displacement"}
+        shape = Shape(X["displacement"], Y["travel"], reach, partial(factor, own), every)
+        of = turning, fitted(every), "travel", "displacement", partial(_at, own, reach)
+        yield of_the_rig(*of, **also, shape=shape)
 
 
 def _of_each_specimen(name: str, specimens: Sequence[int]) -> Iterator[FrameVariant]:
