@@ -77,7 +77,10 @@ class RecordedRig:
     def added(
         self, variant: FrameVariant, wanted: str, force: Varying, values: Mapping[str, float]
     ) -> Varying:
-        """What a form adds to the "reading" [N] or to the "travel" [mm], or its "variable"."""
+        """What a form adds to the "reading" [N], or the "travel" [mm] or its "rate" [mm/s].
+
+        Or its "variable".
+        """
         key = (variant, wanted)
         if key not in self._compiled:
             marched = Marched(variant.of, tuple(p.name for p in variant.parameters))
@@ -89,7 +92,11 @@ class RecordedRig:
                 assert variant.variable is not None
                 value = variant.variable(at)
             else:
-                of = variant.added_reading if wanted == "reading" else variant.added_travel
+                of = {
+                    "reading": variant.added_reading,
+                    "travel": variant.added_travel,
+                    "rate": variant.added_rate,
+                }[wanted]
                 assert of is not None
                 value = of(marched.at, at)
             self._compiled[key] = marched.define({wanted: value}, history)
@@ -191,6 +198,8 @@ class RecordedRig:
         By the place or the time alone that is as the form has it, however much changes from one
         point to the next; but for a power, whose rate may be infinite where it begins.
         """
+        if variant.added_rate is not None:
+            return self.added(variant, "rate", Varying(np.zeros(())), values)
         steep = variant.shape is not None and variant.shape.fixed.get("shape") == "power sides"
         if variant.remembered is not None or not set(variant.of) <= set(OF_ITSELF) or steep:
             return self.per_second(ahead)

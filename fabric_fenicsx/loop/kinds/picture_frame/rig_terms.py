@@ -12,6 +12,7 @@ from ufl import conditional, exp, gt, max_value, min_value
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.law import size_of
 from ....mechanics.laws.shapes import shape_of
+from ....mechanics.scalars import derivative_of
 from ...inference.effects import Effect, Shape, Values, valued
 from .rig_variables import RIG, RIG_VARIABLES, Rig
 from .shapes import (
@@ -55,7 +56,7 @@ ROUNDED = (0.03, 0.2)
 #: Memories of what lags, as shares of the longest run: a filter's are short.
 LAGS = (0.003, 0.01, 0.05, 0.2)
 #: Ways over which a play is taken up, as shares of the largest displacement.
-PLAYS = (0.01, 0.05)
+PLAYS = (0.01, 0.05, 0.15)
 
 Turning = Literal["", "at its rate", "kept in a hold", "over a way", "on the way back"]
 """Whether what is added has the sign of the motion, and what that is where nothing moves or, as of
@@ -63,6 +64,9 @@ a play, where it has just turned. A play that is taken up at first is seen on th
 
 ALONG_A_WAY: tuple[Turning, ...] = ("over a way", "on the way back")
 """Where it turns as the crosshead goes on."""
+
+ENDS = {"over a way": (-1.0, 1.0), "on the way back": (1.0, 0.0)}
+"""What it comes to on the way back, and on the way out."""
 
 
 SLIP_SHAPES = ("linear", "2 coefficients", "3 coefficients", "corner", "saturation")
@@ -276,11 +280,9 @@ def of_the_rig(
     if turning == "kept in a hold":
         remembered = partial(_last_way, slow)
     elif turning in ALONG_A_WAY:
-        out = 1.0 if turning == "over a way" else 0.0
-        back = -1.0 if turning == "over a way" else 1.0
 
         def remembered(p: Values, at: Values, past: Any) -> Any:
-            return _turned_over(valued(way, p), at, past, out, back)
+            return _turned_over(valued(way, p), ENDS[turning], at, past)
 
     elif kind.remembered is not None:
         own = kind.remembered
@@ -299,9 +301,19 @@ def of_the_rig(
     def slipped(p: Values, at: Values) -> Any:
         return -at["free_length"] * whole(p, at)
 
+    def rate(p: Values, at: Values) -> Any:
+        size = added(p, kind.value(at))
+        grows = derivative_of(size, at[variable]) * per_second[variable](at)
+        return grows * at["memory"] + size * _turns(valued(way, p), ENDS[turning], at)
+
+    per_second: dict[str, Callable[[Values], Any]] = {
+        "displacement": lambda at: at["speed"],
+        "time": lambda at: 1.0,
+        "run": lambda at: 0.0,
+    }
     of = [*kind.of, *(name for other in others for name in other.of)]
     of += ["free_length"] * (acts_on == "slip")
-    of += ["per_time"] * (turning in ALONG_A_WAY)
+    of += ["displacement", "displacement_before"] * (turning in ALONG_A_WAY)
     at_once = remembered is None and not turning and set(of) <= {"force", "time", "run"}
     in_series = acts_on == "travel" and "force" in of and at_once
     return FrameVariant(
@@ -313,6 +325,7 @@ def of_the_rig(
         variable=kind.value if kind.remembered is not None else None,
         added_reading=whole if acts_on == "reading" else None,
         added_travel={"travel": whole, "slip": slipped}.get(acts_on),
+        added_rate=rate if turning in ALONG_A_WAY and variable in per_second else None,
         rounds=ROUNDS if in_series or "width" in of else 0,
         in_series=in_series,
     )
@@ -350,11 +363,17 @@ def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
     return conditional(gt(size_of(at["speed"]), slow), way, past)
 
 
-def _turned_over(way: Any, at: Values, past: Any, out: float, back: float) -> Any:
-    """From what it is out to what it is back along e^(−ΔD/way), and as it was in a hold."""
-    step = at["speed"] / (at["per_time"] * way)
-    kept, end = exp(-size_of(step)), conditional(gt(step, 0), out, back)
+def _turned_over(way: Any, ends: tuple[float, float], at: Values, past: Any) -> Any:
+    """From what it is back to what it is out along e^(−ΔD/way), and as it was in a hold."""
+    step = (at["displacement"] - at["displacement_before"]) / way
+    kept, end = exp(-size_of(step)), conditional(gt(step, 0), ends[1], ends[0])
     return kept * past + (1 - kept) * end
+
+
+def _turns(way: Any, ends: tuple[float, float], at: Values) -> Any:
+    """How fast that changes [1/s]."""
+    end = conditional(gt(at["speed"], 0), ends[1], ends[0])
+    return (end - at["memory"]) * size_of(at["speed"]) / way
 
 
 def _zero(name: str, turning: Turning) -> dict[str, Parameter]:

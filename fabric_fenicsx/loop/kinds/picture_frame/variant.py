@@ -27,6 +27,8 @@ class FrameVariant(Variant):
         remembers_travel: ``travel`` depends on ``past``.
         added_reading: what the load cell adds [N], from the parameters and what ``of`` names.
         added_travel: by how much the frame is ahead of the crosshead [mm], from the same.
+        added_rate: how fast that changes [mm/s], likewise; None: as it does from one point to the
+            next, or in place and time.
         of: of "time" in the run [s], the crosshead's "displacement" [mm], "speed" [mm/s] and
             "acceleration" [mm/s²], the "force" [N] of the model and its "force_rate" [N/s], and
             "per_time", 1 over the step from the point before [1/s], "displacement_before" and
@@ -55,6 +57,7 @@ class FrameVariant(Variant):
     remembers_travel: bool = False
     added_reading: Callable[[Values, Values], Any] | None = None
     added_travel: Callable[[Values, Values], Any] | None = None
+    added_rate: Callable[[Values, Values], Any] | None = None
     of: tuple[str, ...] = ()
     remembered: Callable[[Values, Values, Any], Any] | None = None
     variable: Callable[[Values], Any] | None = None
