@@ -371,6 +371,11 @@ def handled(made, held=3):
             "by turns",
             lambda run: {"stiffer": lambda s: 1.0 + 0.2 * (run % 2)},
         ),
+        (
+            "bending_moment_of_run",
+            "run 3 alone",
+            lambda run: {"stiffer": lambda s: 1.2 if run == 2 else 1.0},
+        ),
         ("rest_curvature_of_run", "by turns", lambda run: {"rest": lambda s: 4e-4 * (-1) ** run}),
         ("load_of_run", "step", lambda run: {"heavier": lambda s: 1.2 if run > 1 else 1.0}),
     ],

@@ -200,25 +200,21 @@ def over_runs(name: str, last: float, *, constant: bool = False) -> Iterator[Dra
     if last < FEWEST_BY_TURNS:
         return
     place = Parameter(f"{name}_place", between_runs(last), 0.0, 1.0)
-
     slow = Parameter(f"{name}_width", (SLOW,), SHARP / last, 0.5)
 
-    def from_one_on(width: Parameter | float) -> Of:
-        def step(p: Values, x: Any) -> Any:
-            own = _shape("step", p, (one,), p[place.name], valued(width, p), x)
-            return sum(p[c.name] for c in zero) + own
-
-        return step
+    def from_one_on(p: Values, x: Any, width: Parameter | float) -> Any:
+        own = _shape("step", p, (one,), p[place.name], valued(width, p), x)
+        return sum(p[c.name] for c in zero) + own
 
     def in_one(p: Values, x: Any, k: int) -> Any:
         coefficients = [p[one.name] if k == r else 0.0 for r in range(int(last) + 1)]
         return sum(p[c.name] for c in zero) + shape_of("each", coefficients, x)
 
-    yield "step", (*zero, one, place), from_one_on(SHARP / last)
+    yield "step", (*zero, one, place), partial(from_one_on, width=SHARP / last)
+    for k in range(int(last) + 1):
+        yield f"run {k + 1} alone", (*zero, one), partial(in_one, k=k)
     if last >= FEWEST_TO_CHANGE:
-        yield "slow step", (*zero, one, place, slow), from_one_on(slow)
-        for k in range(int(last) + 1):
-            yield f"run {k + 1} alone", (*zero, one), partial(in_one, k=k)
+        yield "slow step", (*zero, one, place, slow), partial(from_one_on, width=slow)
 
 
 def by_turns(name: str, last: float, *, constant: bool = False) -> Iterator[Drawn]:
