@@ -156,7 +156,7 @@ def alone():
     [
         (("crossover_friction",), 0),
         (("viscous_moment_of_time", "reading_of_displacement"), 2),
-        pytest.param(("reading_of_force",), 1, marks=pytest.mark.slow),
+        pytest.param(("reading_of_force",), 5, marks=pytest.mark.slow),
         (("travel_of_displacement",), 4),
     ],
 )
