@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
-from ufl import conditional, exp, gt, max_value, min_value
+from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.law import size_of
-from ....mechanics.laws.shapes import shape_of
-from ....mechanics.scalars import derivative_of
 from ...inference.effects import Effect, Shape, Values, valued
 from .rig_variables import RIG, RIG_VARIABLES, Rig
 from .shapes import (
@@ -35,6 +32,15 @@ from .shapes import (
     wealth,
     windows,
 )
+from .turning import (
+    ALONG_A_WAY,
+    SLOW,
+    Turning,
+    numbers_of,
+    rate_of,
+    remembered_of,
+    sign_of,
+)
 from .variant import FrameVariant
 
 __all__ = [
@@ -49,25 +55,10 @@ CYCLES = {"time": 40.0, "displacement": 16.0, "force": 8.0}
 SWITCHED = 8.0
 #: How many: what is switched on and off has many.
 OVERTONES = (2, 5)
-#: Share of the largest speed below which its sign is rounded.
-SLOW = 1e-3
-#: ... and where a larger one is looked for, as a share of the speed.
+#: Speeds below which its sign is rounded, as shares of the largest one.
 ROUNDED = (0.03, 0.2)
 #: Memories of what lags, as shares of the longest run: a filter's are short.
 LAGS = (0.003, 0.01, 0.05, 0.2)
-#: Ways over which a play is taken up, as shares of the largest displacement.
-PLAYS = (0.01, 0.05, 0.15)
-
-Turning = Literal["", "at its rate", "kept in a hold", "over a way", "on the way back"]
-"""Whether what is added has the sign of the motion, and what that is where nothing moves or, as of
-a play, where it has just turned. A play that is taken up at first is seen on the way back alone."""
-
-ALONG_A_WAY: tuple[Turning, ...] = ("over a way", "on the way back")
-"""Where it turns as the crosshead goes on."""
-
-ENDS = {"over a way": (-1.0, 1.0), "on the way back": (1.0, 0.0)}
-"""What it comes to on the way back, and on the way out."""
-
 
 SLIP_SHAPES = ("linear", "2 coefficients", "3 coefficients", "corner", "saturation")
 """Of what slips: nothing of it is infinitely steep at no force."""
@@ -183,7 +174,7 @@ def _forms(
         if "per_time" in RIG_VARIABLES[variable].of and variable != "way":
             shares = LAGS if variable.endswith("lag") else ()
             also["memory"] = memory_of(name, largest, *shares)
-        also |= _turned(name, turning, largest)
+        also |= numbers_of(name, turning, largest)
         if gain:
             label, also["gain"] = f"gain, {label}", True
         y = "share_of_reading" if gain else Y[acts_on]
@@ -202,24 +193,12 @@ def _forms(
         )
 
 
-def _turned(name: str, turning: Turning, largest: Mapping[str, float]) -> dict[str, Any]:
-    """Numbers of how what is added turns with the motion."""
-    if not turning:
-        return {}
-    numbers = {"turning": turning, "slow": SLOW * largest["speed"]}
-    if turning in ALONG_A_WAY:
-        starts = tuple(share * largest["displacement"] for share in PLAYS)
-        way = Parameter(f"{name}_way_mm", starts, starts[0] / 10.0, 5.0 * starts[-1])
-        return numbers | {"way": way}
-    return numbers
-
-
 def _plays(name: str, largest: Mapping[str, float]) -> Iterator[FrameVariant]:
     """As of a rack with the same play all along."""
     reach = largest["displacement"]
     for turning in ALONG_A_WAY:
         own = {"shape": "spline", "coefficients": (), **_zero(name, turning)}
-        also = _turned(name, turning, largest)
+        also = numbers_of(name, turning, largest)
         every = own | also | {"variable": "displacement"}
         shape = Shape(X["displacement"], Y["travel"], reach, partial(factor, own), every)
         of = turning, fitted(every), "travel", "displacement", partial(_at, own, reach)
@@ -276,41 +255,30 @@ def of_the_rig(
     """
     kind = RIG_VARIABLES[variable]
     others = [RIG_VARIABLES[also]] if also else []
-    remembered: Callable[[Values, Values, Any], Any] | None = None
-    if turning == "kept in a hold":
-        remembered = partial(_last_way, slow)
-    elif turning in ALONG_A_WAY:
 
-        def remembered(p: Values, at: Values, past: Any) -> Any:
-            return _turned_over(valued(way, p), ENDS[turning], at, past)
+    def of_the_variable(p: Values, at: Values, past: Any) -> Any:
+        assert kind.remembered is not None
+        return kind.remembered(at, past, valued(memory, p))
 
-    elif kind.remembered is not None:
-        own = kind.remembered
-
-        def remembered(p: Values, at: Values, past: Any) -> Any:
-            return own(at, past, valued(memory, p))
+    remembered = remembered_of(turning, slow, way)
+    if remembered is None and kind.remembered is not None:
+        remembered = of_the_variable
 
     def whole(p: Values, at: Values) -> Any:
         size = added(p, kind.value(at), *(other.value(at) for other in others))
         if gain:
             return at["force"] * size
-        if turning == "kept in a hold" or turning in ALONG_A_WAY:
-            return size * at["memory"]
-        return size * shape_of("sign", (1.0,), at["speed"], width=slow) if turning else size
+        return size * sign_of(turning, slow, at) if turning else size
 
     def slipped(p: Values, at: Values) -> Any:
         return -at["free_length"] * whole(p, at)
 
-    def rate(p: Values, at: Values) -> Any:
-        size = added(p, kind.value(at))
-        grows = derivative_of(size, at[variable]) * per_second[variable](at)
-        return grows * at["memory"] + size * _turns(valued(way, p), ENDS[turning], at)
+    known = rate_of(turning, way, variable)
 
-    per_second: dict[str, Callable[[Values], Any]] = {
-        "displacement": lambda at: at["speed"],
-        "time": lambda at: 1.0,
-        "run": lambda at: 0.0,
-    }
+    def rate(p: Values, at: Values) -> Any:
+        assert known is not None
+        return known(added(p, kind.value(at)), p, at)
+
     of = [*kind.of, *(name for other in others for name in other.of)]
     of += ["free_length"] * (acts_on == "slip")
     of += ["displacement", "displacement_before"] * (turning in ALONG_A_WAY)
@@ -325,7 +293,7 @@ def of_the_rig(
         variable=kind.value if kind.remembered is not None else None,
         added_reading=whole if acts_on == "reading" else None,
         added_travel={"travel": whole, "slip": slipped}.get(acts_on),
-        added_rate=rate if turning in ALONG_A_WAY and variable in per_second else None,
+        added_rate=rate if known is not None else None,
         rounds=ROUNDS if in_series or "width" in of else 0,
         in_series=in_series,
     )
@@ -355,25 +323,6 @@ def _courses(name: str, variable: str) -> Iterator[Drawn]:
         yield from pulses(name)
         yield from windows(name)
         yield from ringing(name, CYCLES[variable])
-
-
-def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
-    """The sign of the speed, and of the last one where there is none."""
-    way = conditional(gt(at["speed"], 0), 1.0, -1.0)
-    return conditional(gt(size_of(at["speed"]), slow), way, past)
-
-
-def _turned_over(way: Any, ends: tuple[float, float], at: Values, past: Any) -> Any:
-    """From what it is back to what it is out along e^(−ΔD/way), and as it was in a hold."""
-    step = (at["displacement"] - at["displacement_before"]) / way
-    kept, end = exp(-size_of(step)), conditional(gt(step, 0), ends[1], ends[0])
-    return kept * past + (1 - kept) * end
-
-
-def _turns(way: Any, ends: tuple[float, float], at: Values) -> Any:
-    """How fast that changes [1/s]."""
-    end = conditional(gt(at["speed"], 0), ends[1], ends[0])
-    return (end - at["memory"]) * size_of(at["speed"]) / way
 
 
 def _zero(name: str, turning: Turning) -> dict[str, Parameter]:
