@@ -301,22 +301,25 @@ def test_what_differs_between_specimens_may_go_by_two_variables(apart, name):
     assert own.accounted and [e.name for e in own.found.effects] == [name]
 
 
-def test_a_term_over_two_variables_is_no_simpler_than_one_over_each():
-    """What it leaves is noise, and so do two of one variable, with fewer numbers."""
+@pytest.mark.parametrize(("numbers", "names"), [(1, {"product"}), (6, {"kink", "ripple"})])
+def test_a_term_over_two_variables_is_no_simpler_than_one_over_each(numbers, names):
+    """What it leaves is noise, and so do they, with fewer numbers or with more."""
     columns = {"kink": lambda t: np.maximum(t - 0.6, 0.0), "ripple": lambda t: np.sin(9.0 * t)}
     sizes = {"kink": 3.0, "ripple": 0.5}
 
     def both(t):
         return sum(size * columns[name](t) for name, size in sizes.items())
 
-    of = {f"part{k}": columns[name] for k, name in enumerate(sizes)}
-    of |= {f"part{k}": lambda t, k=k: np.sin((20.0 + k) * t) for k in range(2, 6)}
+    of = (
+        {"product": both} if numbers == 1 else {f"part{k}": columns[n] for k, n in enumerate(sizes)}
+    )
+    of |= {f"part{k}": lambda t, k=k: np.sin((20.0 + k) * t) for k in range(2, numbers)}
     parts = tuple(Parameter(name, amplitude=True) for name in of)
     product = replace(linear_effect("product", *parts, acts_on="reading"), of_two=True)
     terms = [linear_effect(name, acts_on="reading") for name in columns]
     own = search(made(columns | of, both, [*terms, product]))
-    assert own.accounted and {e.name for e in own.found.effects} == {"kink", "ripple"}
-    assert not own.may_be_more
+    assert own.accounted and {e.name for e in own.found.effects} == names
+    assert own.may_be_more is (names == {"product"})
 
 
 def test_what_is_far_behind_a_rival_is_tried_in_its_likeliest_form_alone():

@@ -124,8 +124,14 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
     single, other, least = further, further.found, doubt.least
     if len(chosen.effects) < 2 or other is None:
         rival = _that_leaves_noise(search)
-        of = search.experiment, doubt.terms, search.progress
-        single = Search(*of, most=1, rival=rival, common=search.models.common)
+        single = Search(
+            search.experiment,
+            doubt.terms,
+            search.progress,
+            most=1,
+            rival=rival,
+            common=search.models.common,
+        )
         other = single.run()
     search.judge.compared = True
     final = search.judge.weighed(chosen.fit, chosen.effects)

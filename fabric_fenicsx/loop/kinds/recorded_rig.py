@@ -13,6 +13,7 @@ from ...mechanics.scalars import derivative_of
 from ..expressions.marching import Marched, Varying, spread
 from ..inference.experiment import Readings
 from .picture_frame.motion import Motion
+from .picture_frame.rig_variables import PER_SECOND
 from .picture_frame.variant import FrameVariant
 from .records import laid_out, one_point_before
 
@@ -209,8 +210,7 @@ class RecordedRig:
             marched = Marched((*variant.of, "speed"), tuple(p.name for p in variant.parameters))
             at = marched.at
             added = variant.added_travel(at, at)
-            rate = {"displacement": at["speed"], "time": 1.0}
-            faster = sum(derivative_of(added, at[name]) * rate[name] for name in variant.of)
+            faster = sum(derivative_of(added, at[n]) * PER_SECOND[n](at) for n in variant.of)
             self._compiled[key] = marched.define({"faster": faster}, {})
         known = {"displacement": self.points["D"], "time": self._since_start}
         return self._compiled[key](known | {"speed": self.points["D_rate"]}, values)["faster"]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from ...inputs.parameters import Parameter
 from ...mechanics.laws.law import Crossing
 from ..expressions.marching import Marched, Varying, spread
 from ..inference.experiment import Readings
@@ -23,6 +24,7 @@ __all__ = [
     "laid_out",
     "last_run",
     "of_a_crossing",
+    "one_alone",
     "one_point_before",
     "runs_before",
     "shifted",
@@ -83,6 +85,20 @@ def runs_before(readings: Readings) -> dict[str, Array]:
 def between_runs(last: float) -> tuple[float, ...]:
     """Half-way from each run to the next, as shares of how many were before the last one."""
     return tuple(((np.arange(last) + 0.5) / last).tolist())
+
+
+def one_alone(
+    much: Parameter | float, last: float
+) -> Iterator[tuple[str, tuple[Parameter | float, ...]]]:
+    """What is so in one run alone, for each: label, and coefficients of a shape "each".
+
+    Args:
+        much: how much of it there is.
+        last: how many runs were before the last one.
+    """
+    count = int(last) + 1
+    for k in range(count):
+        yield f"run {k + 1} alone", tuple(much if k == r else 0.0 for r in range(count))
 
 
 def last_run(before: Sequence[float] | Array, fitted: Sequence[int] | Array) -> float:

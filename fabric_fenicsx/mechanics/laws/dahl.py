@@ -13,15 +13,16 @@ from .law import Crossing, Form, size_of
 __all__ = ["DahlFriction", "stick_of_limit_one"]
 
 
-def stick_of_limit_one(past: Any, step: Any) -> Any:
-    """S of ds = dx (1 − s sign dx), Dahl's friction of limit 1, exactly.
+def stick_of_limit_one(past: Any, step: Any, ends: tuple[float, float] = (-1.0, 1.0)) -> Any:
+    """S of ds = |dx| (s± − s), Dahl's friction of limit 1, exactly.
 
     Args:
         past: s at first.
         step: by how much x, the shear over that of the stick, changes.
+        ends: s₋ and s₊, to which it comes as x falls and grows.
     """
-    kept, sign = exp(-size_of(step)), conditional(ge(step, 0), 1.0, -1.0)
-    return kept * past + (1 - kept) * sign
+    kept, end = exp(-size_of(step)), conditional(ge(step, 0), ends[1], ends[0])
+    return kept * past + (1 - kept) * end
 
 
 @dataclass(frozen=True)

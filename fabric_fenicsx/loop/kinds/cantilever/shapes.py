@@ -14,7 +14,7 @@ from ufl import cos, exp
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.shapes import shape_of
 from ...inference.effects import Values, valued
-from ..records import FEWEST_BY_TURNS, SHARP, between_runs
+from ..records import FEWEST_BY_TURNS, SHARP, between_runs, one_alone
 
 __all__ = [
     "DECAYS",
@@ -206,13 +206,12 @@ def over_runs(name: str, last: float, *, constant: bool = False) -> Iterator[Dra
         own = _shape("step", p, (one,), p[place.name], valued(width, p), x)
         return sum(p[c.name] for c in zero) + own
 
-    def in_one(p: Values, x: Any, k: int) -> Any:
-        coefficients = [p[one.name] if k == r else 0.0 for r in range(int(last) + 1)]
-        return sum(p[c.name] for c in zero) + shape_of("each", coefficients, x)
+    def in_one(p: Values, x: Any, each: tuple[Parameter | float, ...]) -> Any:
+        return sum(p[c.name] for c in zero) + shape_of("each", [valued(c, p) for c in each], x)
 
     yield "step", (*zero, one, place), partial(from_one_on, width=SHARP / last)
-    for k in range(int(last) + 1):
-        yield f"run {k + 1} alone", (*zero, one), partial(in_one, k=k)
+    for label, each in one_alone(one, last):
+        yield label, (*zero, one), partial(in_one, each=each)
     if last >= FEWEST_TO_CHANGE:
         yield "slow step", (*zero, one, place, slow), partial(from_one_on, width=slow)
 

@@ -264,20 +264,16 @@ def of_the_rig(
     if remembered is None and kind.remembered is not None:
         remembered = of_the_variable
 
+    def size(p: Values, at: Values) -> Any:
+        return added(p, kind.value(at), *(other.value(at) for other in others))
+
     def whole(p: Values, at: Values) -> Any:
-        size = added(p, kind.value(at), *(other.value(at) for other in others))
         if gain:
-            return at["force"] * size
-        return size * sign_of(turning, slow, at) if turning else size
+            return at["force"] * size(p, at)
+        return size(p, at) * sign_of(turning, slow, at) if turning else size(p, at)
 
     def slipped(p: Values, at: Values) -> Any:
         return -at["free_length"] * whole(p, at)
-
-    known = rate_of(turning, way, variable)
-
-    def rate(p: Values, at: Values) -> Any:
-        assert known is not None
-        return known(added(p, kind.value(at)), p, at)
 
     of = [*kind.of, *(name for other in others for name in other.of)]
     of += ["free_length"] * (acts_on == "slip")
@@ -293,7 +289,7 @@ def of_the_rig(
         variable=kind.value if kind.remembered is not None else None,
         added_reading=whole if acts_on == "reading" else None,
         added_travel={"travel": whole, "slip": slipped}.get(acts_on),
-        added_rate=rate if known is not None else None,
+        added_rate=rate_of(turning, way, variable, size),
         rounds=ROUNDS if in_series or "width" in of else 0,
         in_series=in_series,
     )

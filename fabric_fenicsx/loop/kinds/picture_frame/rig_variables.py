@@ -13,7 +13,7 @@ from ....mechanics.laws.law import size_of
 from ....mechanics.laws.variables import recent
 from ...inference.effects import Values
 
-__all__ = ["RIG", "RIG_VARIABLES", "STRIP_RIG", "Rig", "RigVariable"]
+__all__ = ["PER_SECOND", "RIG", "RIG_VARIABLES", "STRIP_RIG", "Rig", "RigVariable"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +90,13 @@ RIG_VARIABLES = {
 }
 """By their names; a way is Σ|ΔD|, a mean speed that of its size, and a lag what the mean over the
 last τ differs by from what is now. A force per width and a pinned angle are of a strip."""
+
+PER_SECOND: Mapping[str, Callable[[Values], Any]] = {
+    "displacement": lambda at: at["speed"],
+    "time": lambda at: 1.0,
+    "run": lambda at: 0.0,
+}
+"""How fast variables change that go by nothing but the motion."""
 
 Rig = Mapping[str, Mapping[str, tuple[str, ...]]]
 """What acts on what of a rig, by which variable, and what that is called in a report."""

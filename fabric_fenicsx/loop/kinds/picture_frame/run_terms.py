@@ -19,8 +19,8 @@ from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ShapedLaw
 from ....mechanics.laws.shapes import shape_of
 from ....mechanics.laws.springs import PolynomialSpring
 from ...inference.effects import Effect, Shape, Values, valued
-from ..records import FEWEST_BEFORE, FEWEST_BY_TURNS, SHARP, between_runs
-from .shapes import X, factor, fitted, moment_shape, one_alone, over_runs, shapes
+from ..records import FEWEST_BEFORE, FEWEST_BY_TURNS, SHARP, between_runs, one_alone
+from .shapes import X, factor, fitted, moment_shape, over_runs, shapes
 from .terms import remembering
 from .variant import FrameVariant
 

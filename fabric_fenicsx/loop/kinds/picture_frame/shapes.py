@@ -12,7 +12,7 @@ from ....inputs.parameters import Parameter
 from ....mechanics.laws.shaped import ONE_WAY
 from ....mechanics.laws.shapes import GRADED, product_of, shape_of
 from ...inference.effects import Shape, Values, valued
-from ..records import FEWEST_BY_TURNS, SHARP, between_runs
+from ..records import FEWEST_BY_TURNS, SHARP, between_runs, one_alone
 
 __all__ = [
     "FINE",
@@ -33,7 +33,6 @@ __all__ = [
     "moment_shape",
     "moving",
     "of_powers",
-    "one_alone",
     "over",
     "over_runs",
     "product",
@@ -458,10 +457,3 @@ def over_runs(name: str, last: float) -> Iterator[Drawn]:
     yield "step", (one,), {"shape": "step", "place": place, "width": SHARP / last}
     for label, coefficients in one_alone(one, last):
         yield label, coefficients, {"shape": "each"}
-
-
-def one_alone(much: Coefficient, last: float) -> Iterator[tuple[str, tuple[Coefficient, ...]]]:
-    """What is so in one of the runs: label, and coefficients of a shape "each"."""
-    count = int(last) + 1
-    for k in range(count):
-        yield f"run {k + 1} alone", tuple(much if k == r else 0.0 for r in range(count))

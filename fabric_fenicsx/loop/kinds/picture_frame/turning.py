@@ -11,13 +11,15 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Literal
 
-from ufl import conditional, exp, gt
+from ufl import conditional, gt
 
 from ....inputs.parameters import Parameter
+from ....mechanics.laws.dahl import stick_of_limit_one
 from ....mechanics.laws.law import size_of
 from ....mechanics.laws.shapes import shape_of
 from ....mechanics.scalars import derivative_of
 from ...inference.effects import Values, valued
+from .rig_variables import PER_SECOND
 
 __all__ = [
     "ALONG_A_WAY",
@@ -43,13 +45,6 @@ ALONG_A_WAY: tuple[Turning, ...] = ("over a way", "on the way back")
 
 ENDS = {"over a way": (-1.0, 1.0), "on the way back": (1.0, 0.0)}
 """q₋ and q₊."""
-
-PER_SECOND: Mapping[str, Callable[[Values], Any]] = {
-    "displacement": lambda at: at["speed"],
-    "time": lambda at: 1.0,
-    "run": lambda at: 0.0,
-}
-"""How fast variables change that go by nothing but the motion."""
 
 
 def numbers_of(name: str, turning: Turning, largest: Mapping[str, float]) -> dict[str, Any]:
@@ -87,9 +82,9 @@ def sign_of(turning: Turning, slow: float, at: Values) -> Any:
 
 
 def rate_of(
-    turning: Turning, way: Any, variable: str
-) -> Callable[[Any, Values, Values], Any] | None:
-    """How fast a size times that changes [1/s], from the size, the parameters and the rest.
+    turning: Turning, way: Any, variable: str, size: Callable[[Values, Values], Any]
+) -> Callable[[Values, Values], Any] | None:
+    """How fast a size [mm] times that changes [mm/s], see FrameVariant.added_rate.
 
     None where it is not known: of what does not go along a way, or by the force.
 
@@ -97,16 +92,17 @@ def rate_of(
         turning: how it turns.
         way: w [mm], or the parameter that is it.
         variable: that the size depends on.
+        size: from the parameters and what is known.
     """
     if turning not in ALONG_A_WAY or variable not in PER_SECOND:
         return None
     back, out = ENDS[turning]
 
-    def rate(size: Any, p: Values, at: Values) -> Any:
-        grows = derivative_of(size, at[variable]) * PER_SECOND[variable](at)
+    def rate(p: Values, at: Values) -> Any:
+        grows = derivative_of(size(p, at), at[variable]) * PER_SECOND[variable](at)
         end = conditional(gt(at["speed"], 0), out, back)
         turns = (end - at["memory"]) * size_of(at["speed"]) / valued(way, p)
-        return grows * at["memory"] + size * turns
+        return grows * at["memory"] + size(p, at) * turns
 
     return rate
 
@@ -120,5 +116,4 @@ def _last_way(slow: float, p: Values, at: Values, past: Any) -> Any:
 def _turned_over(way: Any, ends: tuple[float, float], p: Values, at: Values, past: Any) -> Any:
     """Q at the end of a step, and as it was in a hold."""
     step = (at["displacement"] - at["displacement_before"]) / valued(way, p)
-    kept, end = exp(-size_of(step)), conditional(gt(step, 0), ends[1], ends[0])
-    return kept * past + (1 - kept) * end
+    return stick_of_limit_one(past, step, ends)
