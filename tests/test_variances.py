@@ -290,6 +290,26 @@ def test_a_floor_of_noise_is_not_lost_where_the_search_begins_without_one():
         assert other.variances.noise.floor == pytest.approx(0.02, rel=0.1)
 
 
+@pytest.mark.parametrize("correlation", [0.0, 0.3, 0.6, 0.89])
+def test_noise_is_not_slow_where_a_line_is_missed(correlation):
+    """A kink of 1.2 beside noise of 0.02: slow noise of 0.06 is likeliest among its neighbours.
+
+    Some searches ended there, by 115 of -2 log likelihood: which ones, round-off decided.
+    """
+    t = np.tile(np.linspace(0.0, 1.0, 150), 4)
+    noise = 0.02 * np.random.default_rng(5).normal(size=len(t))
+    data = readings(
+        10.0 + 2.0 * t + 3.0 * np.maximum(t - 0.6, 0.0) + noise, run=np.arange(600) // 150
+    )
+    columns = {"a": np.ones_like(t), "b": t}
+    line, every = Linear(data, columns, ("a", "b")), np.ones(600, dtype=bool)
+    start = Variances(Noise(0.018, 0.0, correlation), {"a": 0.1, "b": 0.1})
+    found = fit(line, (), {"a": 10.0, "b": 2.0}, every, start)
+    own = estimate(linearised(line, found), start, smooth=True)
+    assert own.variances.noise.floor == pytest.approx(0.02, rel=0.1)
+    assert own.variances.noise.correlation < 0.2
+
+
 def test_a_scatter_that_is_not_known_is_expected_as_the_others_are():
     """Two specimens' slopes, which the common parameters leave open: their levels say something.
 

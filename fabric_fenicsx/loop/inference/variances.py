@@ -53,6 +53,8 @@ RESTARTS = 20
 TRIED = 21
 #: Largest correlation of neighbours; of a single run slower noise is not told from a misfit.
 MOST_CORRELATED, OF_ONE_RUN = 0.9, 0.5
+#: Correlation beyond which noise may as well be a smooth line that is missed.
+SLOW = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +188,16 @@ def estimate(
         even = found.copy()
         even[0], even[2] = np.log(typical / problem.floor), 0.0
         found = min((found, likeliest(even)), key=lambda x: problem.cost(x)[0])
-    taus = problem.split(found)[1]
+    noise, taus, omega = problem.split(found)
+    if smooth and noise.correlation > SLOW:
+        # Slow noise can be likeliest among its neighbours alone, where it is a line that is missed.
+        quick = np.sqrt(1.0 - noise.correlation**2)
+        lined = found.copy()
+        lined[0] = np.log(quick * noise.typical(at.readings, at.rows) / problem.floor)
+        lined[1], lined[2], lined[-1] = 0.0, 0.0, max(omega / quick, 1.0) ** 2
+        lined = np.clip(lined, lower, upper)
+        found = min((found, likeliest(lined)), key=lambda x: problem.cost(x)[0])
+        taus = problem.split(found)[1]
     if ((taus > 0.0) & (taus < SMALL_SCATTER)).any():
         # From scatters that are all small and alike the search may not get to some that are none.
         found = min((found, likeliest(alike(found))), key=lambda x: problem.cost(x)[0])
