@@ -44,7 +44,7 @@ HARDLY = 1e-3
 #: Scatter below which specimens may as well be alike.
 SMALL_SCATTER = 0.03
 #: The search ends where a step changes −2 log likelihood by less than that.
-OPTIONS = {"maxiter": 60, "ftol": 1e-4}
+OPTIONS = {"maxiter": 60, "ftol": 1e-7}
 #: Gain of −2 log likelihood beyond which sizes are taken again, from where the search ended.
 FAR = 100.0
 #: Times that it then begins anew.
