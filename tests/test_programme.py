@@ -93,6 +93,24 @@ def test_a_leg_may_have_its_turns_on_both_sides_of_a_reading(count):
     assert turns == pytest.approx(np.array(driven.corners), rel=1e-6)
 
 
+@pytest.mark.parametrize("last", [0.02, 0.05, 0.1, 0.5, 0.9, 0.98])
+def test_a_turn_shortly_before_a_reading_is_on_the_way_to_it(last):
+    """Friction acts the other way from there on: at the reading itself, by its rate.
+
+    Args:
+        last: share of the interval, from the turn to the reading.
+    """
+    times = np.linspace(0.0, 30.0, 26)
+    step = times[1]
+    turn = times[13] - last * step
+    p = frame_motion(times, 20.0 - 0.05 * (times - turn) ** 2, FRAME.length)
+    at = np.flatnonzero(p.reading == 13)[0]
+    assert p.rate[at] == pytest.approx(-0.1 * last * step, rel=0.05)
+    assert p.displacement[at] < p.displacement[at - 1]
+    assert p.displacement.max() == pytest.approx(20.0, abs=1e-6)
+    assert np.diff(p.time).min() > 1e-7
+
+
 @pytest.mark.parametrize("count", [13, 17, 19, 23])
 def test_a_sparse_sine_is_not_taken_for_it(count):
     driven = sine(0.7, -0.7, 0.05)

@@ -23,7 +23,7 @@ def friction_numbers(
 ) -> dict[str, Any]:
     """What is fitted of a friction with a stick; an index tells several of them apart."""
     about = "shear until the friction slides"
-    stick_angle = Parameter(f"slip_angle{index}_rad", starts, 1e-4, 0.3, meaning=about)
+    stick_angle = Parameter(f"slip_angle{index}_rad", starts, 1e-6, 0.3, meaning=about)
     return {"limit": replace(LIMIT, name=f"m_c{index}_N"), "stick_angle": stick_angle}
 
 

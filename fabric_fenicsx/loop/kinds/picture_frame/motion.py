@@ -27,6 +27,8 @@ JUMP_RATIO = 4.0
 RATE_ERROR = 0.02
 #: Points put between two readings where the speed changes much.
 BETWEEN = 7
+#: Share of a step between two readings within which two points are one.
+AT_ONCE = 1e-6
 #: Share of the readings whose rate is known below which a motion at one speed is looked for ...
 SPARSE = 0.6
 #: ... and the intervals at that speed that it takes.
@@ -246,10 +248,11 @@ def _between(
 ) -> list[tuple[float, float, float]]:
     """Points between readings where the speed changes much: a turn there would go unseen.
 
-    From the cubic with the values and rates of both readings (Hermite).
+    From the cubic with the values and rates of both readings (Hermite); one is where it turns,
+    however shortly before or after a reading that is.
     """
     added = []
-    share = np.arange(1, BETWEEN + 1) / (BETWEEN + 1)
+    every = np.arange(BETWEEN + 2) / (BETWEEN + 1)
     for i in np.flatnonzero(np.abs(np.diff(rate)) > LEAST_JUMP * top):
         start, step = time[i], time[i + 1] - time[i]
         if any(start <= corner <= start + step for corner in corners):
@@ -257,7 +260,9 @@ def _between(
         piece = CubicHermiteSpline(
             [0.0, step], displacement[i : i + 2], rate[i : i + 2], extrapolate=False
         )
-        for s in share * step:
+        turns = piece.derivative().roots(extrapolate=False)
+        new = [t for t in turns if np.abs(t - every * step).min() > AT_ONCE * step]
+        for s in sorted([*(every[1:-1] * step), *new]):
             added.append((float(start + s), float(piece(s)), float(piece(s, 1))))
     return added
 

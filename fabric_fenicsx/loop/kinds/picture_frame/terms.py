@@ -340,7 +340,7 @@ def remembering(
         starts = tuple(share * largest["angle"] for share in WEARS)
         found["wear"] = Parameter(f"{name}_wear_rad", starts, starts[0] / 30.0, 10.0 * starts[-1])
     if base in FRICTION:
-        found["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-4, 0.3)
+        found["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-6, 0.3)
     return found
 
 
