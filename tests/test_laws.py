@@ -458,6 +458,7 @@ TWO = {"also": "angle", "also_reach": 0.5, "coefficients": [0.5, -0.2, 0.3, 0.4]
 #: Laws of several forms in their other forms: the law, and its values beside those of a sample.
 OTHER_FORMS: dict[str, tuple[str, dict[str, Any]]] = {
     "state of rest": ("shaped", {"base": "rest", "constant": 0.02}),
+    "staying": ("shaped", {"base": "staying", "variable": "largest_angle"}),
     "wave": ("shaped", {"base": "odd", "variable": "angle", "shape": "periodic", "width": 0.3}),
     "mean square": (
         "shaped",

@@ -332,6 +332,14 @@ def test_a_state_of_rest_follows_the_largest_angle():
     assert marched(law, gamma)[0] == pytest.approx(shifted)
 
 
+def test_a_moment_stays_against_the_side_of_the_largest_angle():
+    """Of 0.5 |γ|_max, at any angle since: tows that were sheared far and do not come back."""
+    law = ShapedLaw("staying", "largest_angle", reach=1.0, coefficients=(0.5,))
+    gamma = np.array([0.1, 0.3, 0.0, -0.2, -0.4, 0.2])
+    moment = [-0.05, -0.15, -0.15, -0.15, 0.2, 0.2]
+    assert marched(law, gamma)[0] == pytest.approx(moment)
+
+
 def test_a_state_of_rest_is_an_angle_in_a_net():
     """Shares and angles stay what they are, moments per area are times the area."""
     numbers = {"law": "shaped", "variable": "path", "reach": 1.0, "coefficients": [0.5]}
@@ -551,7 +559,8 @@ def test_the_right_term_leaves_noise(tmp_path, put_in, term, truth):
     """In runs held out too, and its shape is the one put in; without it much is left."""
     experiment = PictureFrame([read_measurement(write(tmp_path / "set", 0.0, **put_in))])
     (effect,) = (t for t in experiment.terms if t.name == term)
-    own = (v for v in reversed(effect.variants) if "of all runs" not in v.label)
+    others = ("of all runs", "staying")
+    own = (v for v in reversed(effect.variants) if not any(o in v.label for o in others))
     variant = next(v for v in own if "coefficients" in v.label)
     rows, holdout = experiment.readings.fit, experiment.readings.holdout
     white = Variances(Noise(NOISE))

@@ -19,6 +19,7 @@ __all__ = ["FRICTION", "OF_ELASTIC", "ONE_SIDED", "ONE_WAY", "ShapedLaw"]
 Base = Literal[
     "elastic",
     "rest",
+    "staying",
     "viscous",
     "dissipative",
     "smooth",
@@ -59,6 +60,9 @@ FRICTION = ("dissipative", "smooth", "flowing", *ONE_WAY)
 OF_ELASTIC = ("elastic", "rest")
 """Bases made of the spring's moment, whose numbers are no moments per area."""
 
+OF_THE_SIDE = ("rest", "staying")
+"""Bases that remember on which side the angle was largest."""
+
 
 def flowed(stick: Any, turns: Any, exponent: Any) -> Any:
     """What is left of a moment over its limit, s, while it flows: ds/dt = −a s |s|^(n−1), exactly.
@@ -92,7 +96,7 @@ class ShapedLaw(CrossingLaw):
             "outward" sign γ while |γ| grows, "forward" 1 while γ grows. Of "rest" it is no factor
             but an angle, to which the spring has moved its state of rest: with e the elastic moment
             and s the sign of γ where it was largest so far, M = e(γ − s (c₀ + f)) − e(γ), as of a
-            permanent set.
+            permanent set; of "staying" it is a moment as large at any angle, M = −s (c₀ + f).
         variable: v, see ``variables.VARIABLES``.
         reach: v_max [rad, rad/s or s].
         coefficients: of f: [-] of the elastic base, [rad] of an angle of rest, [N mm s] of the
@@ -235,15 +239,15 @@ class ShapedLaw(CrossingLaw):
     def history(self, at: Crossing) -> dict[str, Any]:
         """The variables, if they remember, and what the base remembers of its own.
 
-        Of a friction its moment over its limit, of a state of rest the largest angle so far and
-        its sign.
+        Of a friction its moment over its limit, of what goes by the side the largest angle so far
+        and its sign.
         """
         history = {} if self.variable in AT_HAND else {"variable": self._remembered(at)}
         if self.variable == "healed":
             history["felt"] = self.variable_at(at)
         if self.also is not None and self.also not in AT_HAND:
             history["also"] = self._also_at(at)
-        if self.base == "rest":
+        if self.base in OF_THE_SIDE:
             history |= {"largest": max_value(at.past("largest"), at.size), "side": self._side(at)}
         if self.base in FRICTION:
             history["stick"] = self._stick(at)
@@ -272,6 +276,8 @@ class ShapedLaw(CrossingLaw):
     def _base_at(self, at: Crossing) -> Any:
         if self.base == "elastic":
             return self._elastic(at, at.gamma)
+        if self.base == "staying":
+            return -self._side(at)
         if self.base == "viscous":
             return at.rate
         if self.base in ONE_WAY:

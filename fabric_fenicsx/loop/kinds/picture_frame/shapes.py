@@ -165,6 +165,7 @@ Y = {
 
 BEGINS = {
     "rest": "state of rest of the elastic moment: ",
+    "staying": "moment: −sign(shear angle where it was largest) × ",
     "viscous": "moment: shear rate × ",
     "dissipative": "moment: friction × ",
     "smooth": "moment: friction × ",

@@ -296,17 +296,18 @@ def _lagging_effect(
 
 
 ALIKE = {
+    "rest": ("rest", "staying"),
     "dissipative": ("dissipative", "smooth"),
     "outward": ("outward", "forward"),
     "odd": ("odd", "elastic"),
 }
-"""Bases of one term: frictions, ways by |γ| or by γ, and what is added or is a factor."""
+"""Bases of one term: of a set, frictions, ways by |γ| or by γ, and what is added or is a factor."""
 
 OF_BASELINE = (("odd", "angle"), ("odd_in_rate", "rate"))
 """Bases and variables in proportion to which the baseline has a moment, by k1 or c1."""
 
 ABOUT = {
-    "rest": "state of rest of the elastic moment",
+    "rest": "state of rest of the elastic moment, or moment that stays",
     "outward": "moment on one way alone",
 }
 """What a base is called where its name does not do."""
@@ -352,7 +353,7 @@ def _laws(
     fixed |= remembering(name, base, variable, largest)
     if base in (*FRICTION, *ALIKE["outward"]):
         fixed["constant"] = Parameter(f"{name}_0", amplitude=True)
-    second = base in ("smooth", "forward") or (base, variable) == ("elastic", "angle")
+    second = base in ("staying", "smooth", "forward") or (base, variable) == ("elastic", "angle")
     also = f", {base}" if second else ""
     drawn = [*shapes(name, wealth(base, variable))]
     if (base, variable) == ("elastic", "angle"):
