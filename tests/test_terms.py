@@ -414,14 +414,14 @@ def travels(*corners):
     return gamma, FRAME * (2 * np.cos(theta) - math.sqrt(2.0))
 
 
-def write(folder, wear, permanent=0.0, guide=0.0, below=0.0, warms=0.0, hooks=0.0):
+def write(folder, wear, permanent=0.0, guide=0.0, below=0.0, warms=0.0, hooks=0.0, stays=0.0):
     """Two fitted runs and one held out.
 
     Of the elastic moment, wear (1 − e^(−path/0.6)) is lost, its state of rest is at
     ``permanent`` max(γ_max − 0.2, 0), and a guide rubs with ``guide`` [N] at 25 ± 8 mm. Below the
     largest angle the moment is less by ``below`` γ_max sin²(πγ/γ_max). A load cell that warms up
     begins at ``warms`` [N], of which e^(−t/60 s) is left. Tows hook at 0.25 rad with ``hooks`` [N],
-    of which e^(−path/0.25) is left.
+    of which e^(−path/0.25) is left. A moment ``stays`` max(γ_max − 0.1, 0) stays at any angle.
     """
     folder.mkdir(parents=True)
     rng = np.random.default_rng(5)
@@ -441,6 +441,7 @@ def write(folder, wear, permanent=0.0, guide=0.0, below=0.0, warms=0.0, hooks=0.
         m = elastic * (1.0 - wear * (1.0 - np.exp(-path / 0.6))) + C1 * rate
         largest = np.maximum.accumulate(np.maximum(gamma, 1e-9))
         m = m - below * largest * np.sin(np.pi * gamma / largest) ** 2
+        m = m - stays * np.maximum(largest - 0.1, 0.0)
         m = m + hooks * np.exp(-(((gamma - 0.25) / 0.06) ** 2) - path / 0.25)
         force = m * FABRIC**2 / (FRAME * np.sin(np.pi / 4 - gamma / 2))
         force = force + warms * np.exp(-time / 60.0)
@@ -478,6 +479,14 @@ def test_wear_is_discovered(worn):
     assert ("moment", ["path"]) in variables
     error = report["error"]
     assert error["before"]["holdout"] > 3.0 * NOISE > 2.0 * error["after"]["holdout"]
+
+
+def test_a_moment_that_stays_is_no_friction(tmp_path):
+    """Friction whose stick is bent by all of the shear leaves hardly more, and has a name."""
+    found = diagnose([read_measurement(write(tmp_path / "set", 0.0, stays=0.2 * K1))])
+    assert found.report["verdict"] == "effect_discovered" and found.report["effects"] == []
+    (term,) = found.report["discovered"]
+    assert (term["acts_on"], term["depends_on"]) == ("moment", ["largest_angle"])
 
 
 def test_the_shape_is_the_one_put_in(worn):
