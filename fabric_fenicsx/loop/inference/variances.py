@@ -180,6 +180,10 @@ def estimate(
         other[3 : 3 + len(groups)] = HARDLY
         return other
 
+    def likelier(x: Array, start: Array) -> Array:
+        """Components, or those that a search from others ends at, whichever are likelier."""
+        return min((x, likeliest(start)), key=lambda x: problem.cost(x)[0])
+
     found = likeliest(x0)
     noise = problem.split(found)[0]
     typical = noise.typical(at.readings, at.rows)
@@ -187,20 +191,19 @@ def estimate(
         # A floor of next to nothing can be likeliest among its neighbours alone.
         even = found.copy()
         even[0], even[2] = np.log(typical / problem.floor), 0.0
-        found = min((found, likeliest(even)), key=lambda x: problem.cost(x)[0])
-    noise, taus, omega = problem.split(found)
+        found = likelier(found, even)
+    noise, _, omega = problem.split(found)
     if smooth and noise.correlation > SLOW:
         # Slow noise can be likeliest among its neighbours alone, where it is a line that is missed.
         quick = np.sqrt(1.0 - noise.correlation**2)
         lined = found.copy()
         lined[0] = np.log(quick * noise.typical(at.readings, at.rows) / problem.floor)
         lined[1], lined[2], lined[-1] = 0.0, 0.0, max(omega / quick, 1.0) ** 2
-        lined = np.clip(lined, lower, upper)
-        found = min((found, likeliest(lined)), key=lambda x: problem.cost(x)[0])
-        taus = problem.split(found)[1]
+        found = likelier(found, np.clip(lined, lower, upper))
+    taus = problem.split(found)[1]
     if ((taus > 0.0) & (taus < SMALL_SCATTER)).any():
         # From scatters that are all small and alike the search may not get to some that are none.
-        found = min((found, likeliest(alike(found))), key=lambda x: problem.cost(x)[0])
+        found = likelier(found, alike(found))
     restricted, likelihood = problem.cost(found)
     if compared and groups:
         # With the components that are likeliest by the likelihood itself, from others.

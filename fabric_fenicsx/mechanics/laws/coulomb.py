@@ -12,9 +12,11 @@ from ...inputs.groups import NotNegative
 from ...inputs.parameters import Parameter
 from .law import Crossing, CrossingLaw, Form, Times, in_degrees, number, per_area
 
-__all__ = ["GROWTH", "LIMIT", "CoulombFriction", "friction_numbers"]
+__all__ = ["GROWTH", "LIMIT", "SLIDES", "CoulombFriction", "friction_numbers"]
 
 LIMIT = Parameter("m_c_N", lower=0.0, amplitude=True, meaning="friction moment per area")
+#: Shears between which a friction that is fitted begins to slide [rad].
+SLIDES = (1e-6, 0.3)
 GROWTH = Parameter("growth_1_rad", (1.0,), 0.0, 50.0, meaning="of m_c, with the angle")
 
 
@@ -23,7 +25,7 @@ def friction_numbers(
 ) -> dict[str, Any]:
     """What is fitted of a friction with a stick; an index tells several of them apart."""
     about = "shear until the friction slides"
-    stick_angle = Parameter(f"slip_angle{index}_rad", starts, 1e-6, 0.3, meaning=about)
+    stick_angle = Parameter(f"slip_angle{index}_rad", starts, *SLIDES, meaning=about)
     return {"limit": replace(LIMIT, name=f"m_c{index}_N"), "stick_angle": stick_angle}
 
 

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ....inputs.parameters import Parameter
+from ....mechanics.laws.coulomb import SLIDES
 from ....mechanics.laws.lagging import Lagging
 from ....mechanics.laws.law import CrossingLaw
 from ....mechanics.laws.shaped import FRICTION, OF_ELASTIC, ONE_SIDED, ONE_WAY, ShapedLaw
@@ -341,7 +342,7 @@ def remembering(
         starts = tuple(share * largest["angle"] for share in WEARS)
         found["wear"] = Parameter(f"{name}_wear_rad", starts, starts[0] / 30.0, 10.0 * starts[-1])
     if base in FRICTION:
-        found["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, 1e-6, 0.3)
+        found["stick_angle"] = Parameter(f"{name}_stick_rad", STICKS, *SLIDES)
     return found
 
 
