@@ -47,6 +47,7 @@ from .loop.kinds.cantilever.variant import StripVariant as StripVariant
 from .loop.kinds.drape.model import Drape as Drape
 from .loop.kinds.drape.variant import DrapeVariant as DrapeVariant
 from .loop.kinds.picture_frame.rig_terms import of_the_rig as of_the_rig
+from .loop.kinds.picture_frame.rig_terms import own_places as own_places
 from .loop.kinds.picture_frame.run_terms import of_the_run as of_the_run
 from .loop.kinds.picture_frame.variant import FrameVariant as FrameVariant
 from .loop.report.figures import data_figure as data_figure

@@ -12,11 +12,12 @@ __all__ = ["errors_beside", "noise_source", "notes_of"]
 
 #: Said where a run has parameters of its own.
 OWN_ZERO = (
-    "{} of each run: in a run that is not fitted {} taken from its own readings, so that its error "
+    "{}: in a run that is not fitted {} taken from its own readings, so that its error "
     "tests the shape of the {}, not where it begins."
 )
-OF_A_CELL = "A load cell's zero, and its drift,", "they are", "force"
-OF_A_CAMERA = "The camera's zero", "it is", "strip"
+OF_A_CELL = "A load cell's zero, and its drift, of each run", "they are", "force"
+OF_A_FRAME = "The place that the frame was put back to before each run", "it is", "force"
+OF_A_CAMERA = "The camera's zero of each run", "it is", "strip"
 
 
 def errors_beside(
@@ -58,8 +59,13 @@ def noise_source(judge: Judge, noise: float) -> str:
 
 def notes_of(judge: Judge, chosen: Fit, baseline: Fit) -> list[str]:
     """How the reported model was come by, where that limits what it says."""
-    words = OF_A_CAMERA if judge.experiment.test == "cantilever" else OF_A_CELL
-    notes = [OWN_ZERO.format(*words)] if has_own(chosen.variants) else []
+    of_a_run = OF_A_CAMERA if judge.experiment.test == "cantilever" else OF_A_CELL
+    words = [
+        OF_A_FRAME if getattr(v, "placed", False) else of_a_run
+        for v in chosen.variants
+        if has_own([v])
+    ]
+    notes = [OWN_ZERO.format(*of) for of in dict.fromkeys(words)]
     models = [(baseline, "baseline")]
     models += [(chosen, "reported model")] if chosen is not baseline else []
     for model, name in models:

@@ -27,6 +27,7 @@ from ..inference.noise import estimated_noise
 from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
 from .crossing_moments import BASELINE, CrossingMoments
+from .own_of_runs import PLACE, Predicted, places_of, to_own_places, without, zeros_of
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
 from .recorded_rig import RecordedRig
@@ -323,10 +324,31 @@ class CrossheadTest:
     def _common(
         self, variants: Sequence[Variant], values: Mapping[str, float]
     ) -> tuple[Array, dict[str, Array]]:
-        """The same with specimens that are alike."""
+        """The same with specimens that are alike, and frames where single runs tell they were."""
         mine = [v for v in variants if isinstance(v, FrameVariant)]
+        places = np.zeros(self._points["D"].value.shape[1])
+        found = self._read(mine, values, places)
+        if PLACE not in found[1]:
+            return found
+        _, places = to_own_places(found, self.readings, places)
+        return to_own_places(self._read(mine, values, places), self.readings, places)[0]
+
+    def _read(
+        self, mine: Sequence[FrameVariant], values: Mapping[str, float], places: Array
+    ) -> Predicted:
+        """Crosshead forces and their derivatives.
+
+        Args:
+            mine: the forms of the model.
+            values: of its parameters.
+            places: by how much the frame of runs that are not fitted is ahead of the crosshead
+                [mm], (n_runs,), where those of fitted runs are found.
+        """
         travels = [v for v in mine if v.travel is not None]
         travel = self._recorded.travel(travels[0] if travels else None, values)
+        for v in (v for v in mine if v.placed):
+            own = places_of(self._recorded, v, values, places)
+            travel = self._recorded.moved(travel, v, values, own, Varying(np.zeros(())))
         for v in (v for v in mine if v.added_travel is not None):
             travel = self._moved(v, travel, mine, values)
         whole = self._force(travel, mine, values)
@@ -340,13 +362,16 @@ class CrossheadTest:
                 left = self.readings.observed - self._recorded.at_readings(read.value)
                 of_cell = np.broadcast_to(self._on_the_load_cell, read.value.shape[1:])
                 runs = np.flatnonzero(of_cell)
-                added, own_zeros = self._recorded.of_each_run(v, values, left, self.readings, runs)
+                added, own_zeros = zeros_of(
+                    self._recorded, v, values, left, self.readings, runs, self._compiled
+                )
                 read += cell * added
                 zeros += own_zeros
             elif v.reading is not None:
                 read += cell * self._recorded.reading(v, values)
         force, slopes = read.value, read.slopes
         names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
+        names += [PLACE] * (PLACE in slopes)
         zero = np.zeros(len(self._recorded.place[0]))
         found = {
             name: self._recorded.at_readings(slopes[name]) if name in slopes else zero
@@ -354,9 +379,7 @@ class CrossheadTest:
         }
         for rows, J in zeros:
             # What a zero taken from the readings makes up for.
-            for name, slope in found.items():
-                found[name] = slope.copy()
-                found[name][rows] -= J @ np.linalg.lstsq(J, slope[rows], rcond=None)[0]
+            found = {name: without(slope, rows, J) for name, slope in found.items()}
         return self._recorded.at_readings(force), found
 
     def _moved(

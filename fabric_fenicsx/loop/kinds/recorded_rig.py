@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from ...mechanics.scalars import derivative_of
 from ..expressions.marching import Marched, Varying, spread
-from ..inference.experiment import Readings
 from .picture_frame.motion import Motion
 from .picture_frame.rig_variables import PER_SECOND
 from .picture_frame.variant import FrameVariant
@@ -20,8 +19,6 @@ from .records import laid_out, one_point_before
 __all__ = ["RecordedRig"]
 
 Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-Integers = npt.NDArray[np.int64]
 
 #: What the crosshead itself tells at each point, and how fast that changes.
 OF_ITSELF = ("displacement", "time")
@@ -224,59 +221,6 @@ class RecordedRig:
             added = variant.reading(marched.at, marched.at["time"])
             self._compiled[key] = marched.define({"force": added}, {})
         return self._compiled[key](self.points, values)["force"]
-
-    def of_each_run(
-        self,
-        variant: FrameVariant,
-        values: Mapping[str, float],
-        left: Array,
-        readings: Readings,
-        runs: Integers,
-    ) -> tuple[Varying, list[tuple[Flags, Array]]]:
-        """What the load cell adds; in a run that is not fitted, what fits best to what is left.
-
-        That is a zero and a drift, whichever of them the form has: no other run tells them.
-
-        Args:
-            variant: with parameters of each fitted run.
-            values: of them.
-            left: what the readings are beyond what is known without it, (n,).
-            readings: all.
-            runs: which a load cell reads.
-
-        Returns:
-            What it adds [N], (n_points, n_runs); of runs that are not fitted their readings, flags,
-            and the columns that were fitted to them.
-        """
-        zeros = []
-        assert variant.reading is not None
-        names = dict.fromkeys(p.shared_name for p in variant.parameters)
-        # The form's, not the variant's, which may have parameters of fewer runs.
-        key = variant.reading
-        if key not in self._compiled:
-            unit = Marched(("time",), tuple(names))
-            force = variant.reading(unit.at, unit.at["time"])
-            self._compiled[key] = unit.define({"force": force}, {})
-        columns = self._compiled[key](self.points, dict.fromkeys(names, 0.0))["force"].slopes
-        shape = self.points["time"].value.shape
-        total, found = np.zeros(shape), {}
-        time = self.at_readings(self.points["time"].value)
-        for run in runs:
-            rows = readings.run == run
-            if f"run{run + 1}_{next(iter(names))}" in values:
-                for n, c in columns.items():
-                    name, column = f"run{run + 1}_{n}", np.broadcast_to(c, shape)[:, run]
-                    total[:, run] += values[name] * column
-                    found[name] = np.zeros(shape)
-                    found[name][:, run] = column
-            else:
-                rows = rows & readings.usable
-                line = np.column_stack([np.ones_like(time), time])
-                J = line[rows]
-                zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
-                zeros.append((rows, J))
-                total[:, run] = zero[0] + zero[1] * self.points["time"].value[:, run]
-        return Varying(total, found), zeros
 
 
 def _bent_at_end(time: Array, values: Array) -> Array:

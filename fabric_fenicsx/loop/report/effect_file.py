@@ -110,11 +110,19 @@ EFFECTS = [
 """
 
 
-OF_EACH = """
+OF_EACH = {
+    "cantilever": """
 import fabric_fenicsx as ff
 
 EFFECTS = [ff.own_term("{name}", form="{label}")]
-"""
+""",
+    "picture_frame": """
+import fabric_fenicsx as ff
+
+EFFECTS = [ff.own_places("{name}")]
+""",
+}
+"""By test: what each run or specimen has of its own."""
 
 
 def effect_file(term: Discovered, titles: str) -> str:
@@ -139,7 +147,8 @@ def effect_file(term: Discovered, titles: str) -> str:
         "acts_on": term.effect.acts_on,
     }
     if shape.points:
-        return (HEAD + OF_EACH).format(label=term.variant.label, **words)
+        text = HEAD + OF_EACH[term.effect.test]
+        return text.format(label=term.variant.label, **words)
     if term.effect.test == "cantilever":
         values = _plain({p.name: term.values[p.name] for p in term.variant.parameters})
         ranges = _plain(shape.fixed["ranges"])

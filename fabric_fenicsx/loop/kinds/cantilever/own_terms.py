@@ -6,13 +6,12 @@ stiffness is the model's (see variances).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from ....inputs.parameters import Parameter
-from ....mechanics.laws.shapes import shape_of
-from ...inference.effects import Effect, Shape, Values, of_run, of_specimen
+from ...inference.effects import Effect, Values, of_run, of_specimen
+from ..each_its_own import each_its_own
 from .term import X, Y, strip_effect, turned
 from .variant import StripVariant
 
@@ -79,7 +78,7 @@ def own_terms(runs: Sequence[int], specimens: Sequence[int]) -> Iterator[Effect]
             if whose == RUN:
                 each = [of_run(own, k) for k in runs] if len(runs) > 1 else []
             if each:
-                parameters, shape = _each(each, whose.removeprefix("each_"), y)
+                parameters, shape = each_its_own(each, whose.removeprefix("each_"), y)
                 forms.append(StripVariant(label, parameters, shape=shape, **options))
         if forms:
             yield strip_effect(name, about, acts_on, depends_on, forms)
@@ -112,17 +111,3 @@ def _form(name: str, label: str) -> tuple[Parameter, str, str, dict[str, Any]]:
         return lambda p, at: does(p[own.name], at)
 
     return own, y, whose, {whose: True, **{of: at_its_value(does) for of, does in what.items()}}
-
-
-def _each(own: Sequence[Parameter], of: str, y: str) -> tuple[tuple[Parameter, ...], Shape]:
-    """The parameters of runs or specimens, and their values over these as a shape."""
-    names = {1 + (p.run or p.specimen or 0): p.name for p in own}
-    last = max(names)
-    points = tuple(number / last for number in names)
-    return tuple(own), Shape(of, y, last, partial(_of_its_own, names, last), points=points)
-
-
-def _of_its_own(names: Mapping[int, str], last: int, p: Values, x: Any) -> Any:
-    """What the run or specimen has that has the number x times the last one's, counted from 1."""
-    each = tuple(p[names[k]] if k in names else 0.0 for k in range(1, last + 1))
-    return shape_of("each", each, (x * last - 1) / (last - 1))

@@ -94,7 +94,9 @@ class PictureFrame(CrossheadTest):
             ranges["path_of_specimen"] = float(whole[fitted].max())
         largest = ranges_of(ranges)
         ends = self._ends()
-        of_one = [*terms(largest, ends, self._specimens), *run_terms(largest)]
+        specimens = self._specimens
+        runs = fitted.tolist() if specimens else []
+        of_one = [*terms(largest, ends, specimens, runs=runs), *run_terms(largest)]
         return [*of_one, *products(largest, ends), *rig_products(largest)]
 
     @property

@@ -10,7 +10,8 @@ from typing import Any
 from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
-from ...inference.effects import Effect, Shape, Values, valued
+from ...inference.effects import Effect, Shape, Values, of_run, valued
+from ..each_its_own import each_its_own
 from .rig_variables import RIG, RIG_VARIABLES, Rig
 from .shapes import (
     Drawn,
@@ -45,6 +46,7 @@ from .variant import FrameVariant
 
 __all__ = [
     "of_the_rig",
+    "own_places",
     "rig_term",
     "rig_terms",
 ]
@@ -86,7 +88,11 @@ LINES = ("force_rate", "force_lag", "displacement_lag")
 
 
 def rig_terms(
-    largest: Mapping[str, float], ends: Ends, specimens: Sequence[int] = (), rig: Rig = RIG
+    largest: Mapping[str, float],
+    ends: Ends,
+    specimens: Sequence[int] = (),
+    rig: Rig = RIG,
+    runs: Sequence[int] = (),
 ) -> Iterator[Effect]:
     """The terms.
 
@@ -95,6 +101,7 @@ def rig_terms(
         ends: between which shares of these the signed ones are.
         specimens: of each run; see shapes.each_specimen.
         rig: what there is to act on.
+        runs: those that are fitted, counted from 0, if they are of one folder.
     """
     for acts_on, variables in rig.items():
         for variable, reported in variables.items():
@@ -106,6 +113,7 @@ def rig_terms(
                 own = [*_of_each_specimen(name, specimens)]
                 # What is so at every other run may be another specimen at every other one.
                 forms = own + [form for form in forms if not (own and form.label == "by turns")]
+                forms += _of_each_run(name, runs)
             if name == "travel_of_speed":
                 forms += _plays(name, largest)
             if name == "reading_of_force":
@@ -213,6 +221,30 @@ def _of_each_specimen(name: str, specimens: Sequence[int]) -> Iterator[FrameVari
         shape = Shape(X["run"], Y["travel"], reach, partial(factor, own), own | {"variable": "run"})
         added = partial(_at, own, reach)
         yield of_the_rig(label, fitted(own), "travel", "run", added, shape=shape)
+
+
+def _of_each_run(name: str, runs: Sequence[int]) -> Iterator[FrameVariant]:
+    """As of a frame that is put back to another place before each run."""
+    if len(runs) > 1:
+        each = [of_run(_place(name), run) for run in runs]
+        parameters, shape = each_its_own(each, "run", Y["travel"])
+        own: dict[str, Any] = {"of": ("run",), "each_run": True, "placed": True}
+        yield FrameVariant("each run its own", parameters, shape=shape, **own)
+
+
+def _place(name: str) -> Parameter:
+    return Parameter(f"{name}_mm", amplitude=True)
+
+
+def own_places(name: str) -> Effect:
+    """The same as an effect: its numbers are found anew, no other run has the same.
+
+    Args:
+        name: of the effect.
+    """
+    form = FrameVariant("each run its own", (_place(name),), each_run=True, placed=True)
+    about = "what acts on the travel, by run"
+    return Effect(name, "picture_frame", about, (form,), of_fabric=False)
 
 
 def _at(numbers: Mapping[str, Any], reach: float, p: Values, x: Any) -> Any:

@@ -83,6 +83,7 @@ def terms(
     ends: Ends = MappingProxyType({}),
     specimens: Sequence[int] = (),
     rig: Rig = RIG,
+    runs: Sequence[int] = (),
 ) -> list[Effect]:
     """The terms of a picture frame, or of another rig of crossings.
 
@@ -96,6 +97,7 @@ def terms(
         ends: of those that may be negative.
         specimens: of each run of the one folder; see shapes.each_specimen.
         rig: see rig_terms.
+        runs: see rig_terms.
     """
     largest = ranges_of(ranges)
     return [
@@ -103,7 +105,7 @@ def terms(
         *_of_one_way(largest, both_ways(ends)),
         *_flowing(largest),
         *_lagging(largest),
-        *rig_terms(largest, ends, specimens, rig),
+        *rig_terms(largest, ends, specimens, rig, runs),
     ]
 
 

@@ -45,9 +45,10 @@ class FrameVariant(Variant):
         rounds: steps of Newton's in which ``added_travel`` is found with the force that it leaves;
             0: with that without it.
         in_series: ... and at the rate that it leaves, as what gives way at once does.
-        each_run: ``reading`` has parameters of its own in each run, as the zero of a load cell
-            has. Those of a holdout run can only come from that run: its error is then what is
-            left after them.
+        each_run: it has parameters of its own in each run, as the zero of a load cell has. Those of
+            a holdout run can only come from that run: its error is then what is left after them.
+        placed: they are by how much the frame is ahead of the crosshead [mm], as one is that was
+            put back to another place before each run.
     """
 
     laws: Callable[[Values], tuple[Any, ...]] | None = None
@@ -67,6 +68,7 @@ class FrameVariant(Variant):
     rounds: int = 0
     in_series: bool = False
     each_run: bool = False
+    placed: bool = False
 
     @property
     def adds_up(self) -> bool:
