@@ -494,6 +494,7 @@ OTHER_FORMS: dict[str, tuple[str, dict[str, Any]]] = {
     "cord": ("lagging", {"pulls": 1}),
     "play": ("lagging", {"memory_s": None, "play_deg": 3.0}),
     "late": ("lagging", {"by": "rate", "reach": 0.1}),
+    "kept": ("lagging", {"by": "kept", "shape": "saturation", "coefficients_N_mm": [0.02]}),
     "two variables": (
         "shaped",
         TWO | {"base": "odd", "variable": "largest_angle", "powers": [1, 3], "constant": 0.0},

@@ -634,6 +634,7 @@ def test_numbers_of_a_file_are_python_s():
         ("lagging_moment_of_angle_and_history", "linear, play"),
         ("lagging_moment_of_angle_history_and_time", "linear"),
         ("lagging_moment_of_rate_and_history", "saturation"),
+        ("lagging_moment_of_history", "saturation"),
         ("dissipative_moment_of_run", "linear"),
         ("reading_of_time_and_run", "saturation, powers 0, 1"),
         ("travel_of_displacement_and_run", "linear, powers 1"),

@@ -286,7 +286,30 @@ def test_what_goes_by_the_rate_may_come_late():
     assert found == pytest.approx(np.where(t <= t[7], rising, fading), rel=1e-9)
 
 
-@pytest.mark.parametrize("numbers", [{"growth": 0.5}, {"by": "rate"}])
+def test_a_branch_may_keep_some_of_the_angle_and_have_a_spring_that_is_not_straight():
+    """At a rate of 0.1 e goes to τ times that, and fades where nothing moves: g of it."""
+    law = Lagging((0.3, 2.0), 0.5, memory=2.0, by="kept")
+    gamma = -np.concatenate([STEP * 0.1 * np.arange(1, 9), np.full(6, STEP * 0.1 * 8)])
+    moments, sizes = marched(law, gamma)
+    t = STEP * np.arange(1, 15)
+    rising = 0.2 * (1.0 - np.exp(-t / 2.0))
+    e = np.where(t <= t[7], rising, rising[7] * np.exp(-(t - t[7]) / 2.0))
+    assert sizes == pytest.approx(e, rel=1e-9)
+    assert moments == pytest.approx(-(0.3 * e / 0.5 + 2.0 * (e / 0.5) ** 2), rel=1e-9)
+
+
+def test_of_a_line_what_is_kept_is_what_is_forgotten():
+    """Both are Maxwell's branch."""
+    rng = np.random.default_rng(5)
+    gamma = np.cumsum(0.05 * rng.standard_normal(30))
+    kept, branch = (
+        marched(Lagging((1.0,), 0.5, memory=3.0, growth=0.4, by=by), gamma)[0]
+        for by in ("kept", "angle")
+    )
+    assert kept == pytest.approx(branch, abs=1e-14)
+
+
+@pytest.mark.parametrize("numbers", [{"growth": 0.5}, {"by": "rate"}, {"by": "kept"}])
 def test_what_never_forgets_is_neither_old_nor_late(numbers):
     with pytest.raises(ValueError, match="memory"):
         Lagging(**LAGGING, **numbers)

@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 
 from ...errors import SolveError
 from .effects import Parameter, Variant
-from .experiment import Experiment
+from .experiment import Experiment, each_by_itself
 from .fitted import Fit, soft_size
 from .fitting import linearised, orthogonal_to, parameters_of
 from .variances import Variances
@@ -35,6 +35,8 @@ SMALL = 1e-9
 #: Combinations that are judged with their bounds, of as many as are wanted, and how many are looked
 #: at before that without them at once.
 LOOKED_AT, AT_ONCE = 6, 500
+#: Combinations that are judged with their bounds sooner than copies of the process are made.
+FEW = 8
 #: How many times as many kinds as are wanted are judged with their bounds.
 SPARE = 2
 
@@ -231,29 +233,41 @@ class ToFirstOrder:
 
     def _unbounded(self, combinations: Sequence[Combination]) -> Array:
         """Sums of squares that combinations of a little leave, without bounds, (n,)."""
-        rows, names = self._base.used, list(self._base.values)
-        lefts = np.full(len(combinations), np.inf)
-        for first in range(0, len(combinations), AT_ONCE):
-            part = combinations[first : first + AT_ONCE]
-            own = [[one.slopes[p.name][rows] for v, one in c for p in v.amplitudes] for c in part]
-            columns = self._whiten(np.column_stack([slope for slopes in own for slope in slopes]))
-            size = np.linalg.norm(columns, axis=0)
-            usable = np.isfinite(size) & (size > 0.0)
-            columns = np.where(usable, columns / np.where(usable, size, 1.0), 0.0)
-            columns = self.beyond(names, np.column_stack([columns, self.residual]))
-            r = columns[:, -1]
-            ends = np.cumsum([len(slopes) for slopes in own])
-            for k, end in enumerate(ends):
-                C = columns[:, end - len(own[k]) : end]
-                by = C.T @ r
-                step = np.linalg.solve(C.T @ C + 1e-9 * np.eye(len(by)), by)
-                lefts[first + k] = r @ r - by @ step
+        firsts = range(0, len(combinations), AT_ONCE)
+        parts = [combinations[first : first + AT_ONCE] for first in firsts]
+        lefts = each_by_itself(self._experiment, self._left_by_a_little, parts)
+        return np.concatenate(lefts) if lefts else np.zeros(0)
+
+    def _left_by_a_little(self, combinations: Sequence[Combination]) -> Array:
+        """See _unbounded."""
+        rows, lefts = self._base.used, np.empty(len(combinations))
+        own = [
+            [one.slopes[p.name][rows] for v, one in c for p in v.amplitudes] for c in combinations
+        ]
+        columns = self._whiten(np.column_stack([slope for slopes in own for slope in slopes]))
+        size = np.linalg.norm(columns, axis=0)
+        usable = np.isfinite(size) & (size > 0.0)
+        columns = np.where(usable, columns / np.where(usable, size, 1.0), 0.0)
+        columns = self.beyond([*self._base.values], np.column_stack([columns, self.residual]))
+        r = columns[:, -1]
+        ends = np.cumsum([len(slopes) for slopes in own])
+        for k, end in enumerate(ends):
+            C = columns[:, end - len(own[k]) : end]
+            by = C.T @ r
+            step = np.linalg.solve(C.T @ C + 1e-9 * np.eye(len(by)), by)
+            lefts[k] = r @ r - by @ step
         return lefts
 
     def least_left(self, combinations: Sequence[Combination]) -> float:
         """The least sum of squares that one of some combinations leaves; infinite without any."""
-        starts = (self.start(one) for one in combinations)
+        starts = self.starts(combinations)
         return min((start.left for start in starts if start is not None), default=float("inf"))
+
+    def starts(self, combinations: Sequence[Combination]) -> list[Start | None]:
+        """Of each combination the step; see start."""
+        if len(combinations) < FEW:
+            return [self.start(one) for one in combinations]
+        return each_by_itself(self._experiment, self.start, combinations)
 
     def start(self, combination: Combination) -> Start | None:
         """The step that least squares would take within bounds, and the sum of squares after it.

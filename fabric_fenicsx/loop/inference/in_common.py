@@ -43,6 +43,7 @@ class InCommon:
         objects: Sequence[object],
         each: Sequence[P],
         make: Callable[[Sequence[P]], Sequence[T]],
+        parts: Callable[[P], Sequence[object]] = lambda one: (one,),
     ) -> list[T]:
         """Likewise of each of some further objects.
 
@@ -51,15 +52,17 @@ class InCommon:
             objects: see above, which all are made of.
             each: what one each is made of.
             make: makes those that are lacking, in their order.
+            parts: objects that one of them is made of, which have to be the very same; by default
+                itself.
         """
         if not self._keeps:
             return list(make(each))
-        keys = [(numbers, tuple(map(id, (*objects, one)))) for one in each]
+        keys = [(numbers, tuple(map(id, (*objects, *parts(one))))) for one in each]
         lacking = {key: one for key, one in zip(keys, each, strict=True) if key not in self._made}
         made = make([*lacking.values()]) if lacking else ()
         for (key, one), new in zip(lacking.items(), made, strict=True):
             # No other object takes the place of one that is kept with it.
-            self._made[key] = (*objects, one), new
+            self._made[key] = (*objects, *parts(one)), new
         return [self._made[key][1] for key in keys]
 
 

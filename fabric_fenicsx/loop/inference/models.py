@@ -158,10 +158,37 @@ class Models:
 
         See fit_combinations.
         """
-        make = partial(
-            fit_combinations,
+        if base is None and most is None:
+            return self.fitted_each([combinations], starts)[0]
+        every = self._with(base or self.base, starts, most, combinations)
+        return self._added(every)
+
+    def fitted_each(self, each: Sequence[Sequence[Combination]], starts: int) -> list[list[Fit]]:
+        """The same of each of some sets of combinations by themselves, added to the baseline."""
+        with_one = partial(self._with, self.base, starts, None)
+
+        def make(lacking: Sequence[Sequence[Combination]]) -> list[list[Fit]]:
+            if len(lacking) == 1:
+                return [with_one(lacking[0])]
+            forms = [v for own in lacking for one in own for v, _ in one]
+            known = self._known_to_all([self.base], [self.variances, *forms])
+            return each_by_itself(self.experiment, with_one, lacking, known)
+
+        def parts(own: Sequence[Combination]) -> list[object]:
+            # Nothing tells where one of them ends.
+            return [part for one in own for part in (*(of for form in one for of in form), None)]
+
+        numbers = ("with effects", starts, numbers_of(self.variances))
+        every = self.common.of_each(numbers, (self.base,), each, make, parts)
+        return [self._added(found) for found in every]
+
+    def _with(
+        self, base: Fit, starts: int, most: int | None, combinations: Sequence[Combination]
+    ) -> list[Fit]:
+        """See fit_combinations."""
+        return fit_combinations(
             self.experiment,
-            base or self.base,
+            base,
             combinations,
             self.variances,
             starts=starts,
@@ -169,13 +196,9 @@ class Models:
             kind=self._effects_in,
             robust=CRITERIA.far,
         )
-        if base is not None:
-            every = make()
-        else:
-            added = [part for one in combinations for form in one for part in form]
-            sizes = tuple(map(len, combinations))
-            numbers = ("with effects", starts, most, sizes, numbers_of(self.variances))
-            every = self.common(numbers, (self.base, *added), make)
+
+    def _added(self, every: Sequence[Fit]) -> list[Fit]:
+        """Fits but those of which parts cancel, which are among ``forms`` from now on."""
         found = [model for model in every if not cancelling(model)]
         for model in found:
             effects = frozenset(self.effects_of(model))

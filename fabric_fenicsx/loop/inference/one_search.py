@@ -296,9 +296,10 @@ class Search:
         if self._screened_first:
             # What noise hides as it was about the baseline may be as good as the best.
             tried = screen.most_promising(CRITERIA.terms, CRITERIA.decisive)
-        for k, effect in enumerate(tried):
+        for k, (effect, first) in enumerate(
+            zip(tried, self._far_behind(screen, tried), strict=True)
+        ):
             self.progress(0.1 + 0.4 * k / len(tried), f"fit {effect.name}")
-            first = self._far_behind(screen, effect)
             found += first
             if not first:
                 own = by_itself(self._signatures[effect])
@@ -365,8 +366,8 @@ class Search:
             nearest: criterion of the best model so far.
         """
         left: dict[Effect, tuple[float, Fit]] = {}
-        for effect in ranked:
-            for model in self.models.fitted([screen.best_form(effect)], starts=1):
+        for effect, own in zip(ranked, self._glimpses(screen, ranked), strict=True):
+            for model in own:
                 size = model.size(CRITERIA.far) + self.judge.cost(model, (effect,))
                 left[effect] = size, model
         found: list[Fit] = []
@@ -377,12 +378,16 @@ class Search:
                 found += self.models.fitted(by_itself(signs[effect]), starts=1)
         return self.models.ranked(found, nearest)
 
-    def _far_behind(self, screen: Screen, effect: Effect) -> list[Fit]:
-        """The likeliest form of an effect, fitted, if it is far behind the rival; else nothing."""
+    def _glimpses(self, screen: Screen, effects: Sequence[Effect]) -> list[list[Fit]]:
+        """The likeliest form of each effect, fitted."""
+        return self.models.fitted_each([[screen.best_form(e)] for e in effects], starts=1)
+
+    def _far_behind(self, screen: Screen, effects: Sequence[Effect]) -> list[list[Fit]]:
+        """The likeliest form of each effect, if it is far behind the rival; else nothing."""
         if self._rival is None:
-            return []
-        first = self.models.fitted([screen.best_form(effect)], starts=1)
-        return first if all(map(self._is_far_behind, first)) else []
+            return [[] for _ in effects]
+        every = self._glimpses(screen, effects)
+        return [first if all(map(self._is_far_behind, first)) else [] for first in every]
 
     def _is_far_behind(self, model: Fit) -> bool:
         """Whether a fitted model leaves far more than the rival, with noise as it is known now."""

@@ -62,8 +62,8 @@ def fit_combinations(
     linear = ToFirstOrder(experiment, base, variances, robust)
     by_forms: dict[tuple[Variant, ...], list[Start]] = {}
     kinds: dict[tuple[Variant, ...], Hashable] = {}
-    for combination in linear.most_promising(combinations, starts, most, kind):
-        start = linear.start(combination)
+    chosen = linear.most_promising(combinations, starts, most, kind)
+    for combination, start in zip(chosen, linear.starts(chosen), strict=True):
         if start is not None:
             forms = (*base.variants, *(v for v, _ in combination))
             by_forms.setdefault(forms, []).append(start)

@@ -14,6 +14,8 @@ from .variables import kept
 
 __all__ = ["Lagging"]
 
+By = Literal["angle", "rate", "kept"]
+
 
 @dataclass(frozen=True)
 class Lagging(CrossingLaw):
@@ -23,7 +25,9 @@ class Lagging(CrossingLaw):
     there. A straight one is a Maxwell branch. p is γ, or follows it with a play, |γ − p| <= r. τ is
     the same for ever, or grows with the time, τ₀ + a t, as of what ages (L. C. E. Struik, Physical
     Aging in Amorphous Polymers and Other Materials, 1978). A cord along one diagonal cannot push:
-    its moment is never below 0, or never above. By the rate M is late: τ dM/dt = g(γ̇) − M.
+    its moment is never below 0, or never above. By the rate M is late: τ dM/dt = g(γ̇) − M. By what
+    is kept of the angle a branch of Maxwell's has a spring that is not straight: M = g(e) with
+    de/dt = dγ/dt − e/τ.
 
     Attributes:
         coefficients: of f [N mm].
@@ -35,10 +39,10 @@ class Lagging(CrossingLaw):
         growth: a [-]; None is none.
         play: r [rad]; None is none.
         pulls: to which side of γ alone, 1 or −1; 0 to both.
-        by: "angle" or "rate".
+        by: "angle", "rate", or "kept", what is kept of the angle.
 
     Raises:
-        ValueError: it grows old, or goes by the rate, without a memory.
+        ValueError: it grows old, or goes by anything but the angle, without a memory.
     """
 
     coefficients: Any = per_area("coefficients_N_mm", "of the moment, per area", list[float])
@@ -52,40 +56,39 @@ class Lagging(CrossingLaw):
     play: Any = in_degrees("play_deg", "in which the angle does nothing", Positive | None, None)
     pulls: Literal[-1, 0, 1] = number("pulls", "to one side alone", Literal[-1, 0, 1], 0)
 
-    by: Literal["angle", "rate"] = number("by", "of what it is", Literal["angle", "rate"], "angle")
+    by: By = number("by", "of what it is", By, "angle")
 
     law = "lagging"
 
     def __post_init__(self) -> None:
         """Compare numbers that go together."""
-        if self.memory is None and (self.growth is not None or self.by == "rate"):
-            raise ValueError("growth, and what goes by the rate, need a memory")
+        if self.memory is None and (self.growth is not None or self.by != "angle"):
+            raise ValueError("growth, and what goes by the rate or what is kept, need a memory")
 
     def variable_at(self, at: Crossing) -> Any:
-        """|p|, or the rate's size, at the end of the step."""
-        return size_of(at.rate if self.by == "rate" else self._place(at))
+        """|p|, or the size of the rate, or of what is kept, at the end of the step."""
+        of = {"angle": self._place, "rate": lambda at: at.rate, "kept": self._kept}
+        return size_of(of[self.by](at))
 
     def moment(self, at: Crossing) -> Any:
-        """M, exact where g changes evenly within the step, or γ̇ does not, and τ does not."""
-        past = at.past("moment")
+        """M, exact where g, or p of what is kept, changes evenly within the step, or γ̇ does not."""
         if self.by == "rate":
             left = kept(at.per_time, self._memory(at))
-            moment = left * past + (1 - left) * self._curve(at, at.rate)
+            moment = left * at.past("moment") + (1 - left) * self._curve(at, at.rate)
+        elif self.by == "kept":
+            moment = self._curve(at, self._kept(at))
         else:
-            moment = self._curve(at, self._place(at)) - self._curve(at, self._place_before(at))
-            if self.memory is None:
-                moment = past + moment
-            else:
-                memory = self._memory(at)
-                left = kept(at.per_time, memory)
-                moment = left * past + moment * memory * at.per_time * (1 - left)
+            change = self._curve(at, self._place(at)) - self._curve(at, self._place_before(at))
+            moment = self._forgetful(at, at.past("moment"), change)
         if not self.pulls:
             return moment
         return max_value(moment, 0) if self.pulls > 0 else min_value(moment, 0)
 
     def history(self, at: Crossing) -> dict[str, Any]:
-        """The moment, and p and the time where they matter."""
-        history = {"moment": self.moment(at)}
+        """The moment, or what is kept of the angle, and p and the time where they matter."""
+        history: dict[str, Any] = (
+            {"kept": self._kept(at)} if self.by == "kept" else {"moment": self.moment(at)}
+        )
         if self.play is not None:
             history["place"] = self._place(at)
         if self.growth is not None:
@@ -98,6 +101,18 @@ class Lagging(CrossingLaw):
         if self.growth is None:
             return memory
         return memory + at.number(self.growth) * (at.past("time") + 1 / (2 * at.per_time))
+
+    def _kept(self, at: Crossing) -> Any:
+        """What is kept of p at the end of the step."""
+        return self._forgetful(at, at.past("kept"), self._place(at) - self._place_before(at))
+
+    def _forgetful(self, at: Crossing, past: Any, change: Any) -> Any:
+        """What dx/dt = dy/dt − x/τ is at the end of the step, y changing evenly within it."""
+        if self.memory is None:
+            return past + change
+        memory = self._memory(at)
+        left = kept(at.per_time, memory)
+        return left * past + change * memory * at.per_time * (1 - left)
 
     def _place(self, at: Crossing) -> Any:
         if self.play is None:

@@ -122,6 +122,7 @@ X = {
     "relative_angle": "angle_over_largest",
     "recent_angle": "recent_angle_rad",
     "recent_largest_angle": "recent_largest_angle_rad",
+    "kept_angle": "kept_angle_rad",
     "path": "path_rad",
     "since_reversal": "path_since_reversal_rad",
     "rate": "shear_rate_rad_s",

@@ -46,7 +46,7 @@ __all__ = ["as_reported", "both_ways", "of_a_law", "ranges_of", "remembering", "
 #: As far to either side, as a share of the largest displacement, one of them may have its own.
 SIDE = 0.2
 #: Angles in which a friction begins to slide [rad].
-STICKS = (0.005, 0.03)
+STICKS = (3e-4, 0.005, 0.03)
 #: Shears in which what rests build is broken, as shares of the largest angle.
 WEARS = (0.03, 0.15, 0.6)
 #: Plays of what follows the angle, as shares of the largest one.
@@ -273,6 +273,13 @@ def _lagging(largest: Mapping[str, float]) -> Iterator[Effect]:
     depends_on = ("angle", "history", "time")
     yield _lagging_effect(name, about, depends_on, (("", [*shapes(name, 2)][:2], ageing),), angle)
 
+    name = "lagging_moment_of_history"
+    kept = {"by": "kept", "memory": memory_of(name, largest)}
+    about = "moment of what is kept of the angle"
+    # By a line that is the listed effect, too.
+    drawn = [*shapes(name, 3)][1:]
+    yield _lagging_effect(name, about, ("history",), (("", drawn, kept),), angle, "kept_angle")
+
     name = "lagging_moment_of_rate_and_history"
     late = {"by": "rate", "memory": memory_of(name, largest)}
     about, drawn = "moment of the rate that comes late", [*shapes(name, 3)]
@@ -285,9 +292,10 @@ def _lagging_effect(
     depends_on: tuple[str, ...],
     kinds: Iterable[tuple[str, Sequence[Drawn], Mapping[str, Any]]],
     reach: float,
+    variable: str = "",
 ) -> Effect:
     """A term with some shapes of each kind, which has a name and numbers."""
-    fixed = {"law": Lagging, "variable": depends_on[0], "reach": reach}
+    fixed = {"law": Lagging, "variable": variable or depends_on[0], "reach": reach}
     forms = [
         _law_form(label + words, {**fixed, **numbers, **also, "coefficients": coefficients})
         for words, drawn, also in kinds
