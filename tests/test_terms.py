@@ -1,6 +1,7 @@
 """Terms without a formula: what they depend on, what they are in a net, and that they are found."""
 
 import math
+import re
 import warnings
 
 import numpy as np
@@ -16,7 +17,9 @@ from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.picture_frame import PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
-from fabric_fenicsx.loop.kinds.picture_frame.terms import terms
+from fabric_fenicsx.loop.kinds.picture_frame.products import products
+from fabric_fenicsx.loop.kinds.picture_frame.rig_products import rig_products
+from fabric_fenicsx.loop.kinds.picture_frame.terms import ranges_of, terms
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 from fabric_fenicsx.loop.report.discovered import Discovered, _shortest
 from fabric_fenicsx.loop.report.effect_file import effect_file
@@ -902,3 +905,17 @@ def test_a_formula_begins_with_what_it_is_a_factor_of(name, label, begins):
     (term,) = (t for t in terms(RANGES, {"displacement": (-0.6, 1.0)}) if t.name == name)
     (form,) = (v for v in term.variants if v.label == label)
     assert form.shape.begins == begins
+
+
+def test_what_moves_may_be_at_rest():
+    """A shape that moves with a second variable is one of the first alone: else that is claimed."""
+    known = {term.name: [v.label for v in term.variants] for term in terms(RANGES)}
+    frame = ranges_of(RANGES)
+    checked = 0
+    for product in (*products(frame, {}), *rig_products(frame)):
+        alone, _, _ = product.name.rpartition("_and_")
+        for label in (v.label for v in product.variants if "mov" in v.label):
+            shape = re.sub(r"( that moves|, moving).*", "", label)
+            assert shape in known[alone], (product.name, label)
+            checked += 1
+    assert checked > 30

@@ -52,6 +52,7 @@ SPLINES = (1, 2, 3, 5, 9, 17)
 FINE = (
     ("odd", "angle"),
     ("even", "angle"),
+    ("viscous", "angle"),
     ("dissipative", "angle"),
     ("smooth", "angle"),
     ("reading", "displacement"),

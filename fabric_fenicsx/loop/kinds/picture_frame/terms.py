@@ -61,6 +61,7 @@ CYCLES = {
     ("odd", "angle"): 8.0,
     ("elastic", "time"): 40.0,
     ("viscous", "time"): 40.0,
+    ("viscous", "angle"): 8.0,
     ("dissipative", "time"): 40.0,
     ("dissipative", "since_reversal"): 8.0,
     ("dissipative", "angle"): 8.0,
