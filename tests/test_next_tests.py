@@ -25,6 +25,7 @@ from fabric_fenicsx.loop.kinds.cantilever import CANTILEVER, CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
 from fabric_fenicsx.loop.kinds.picture_frame import PICTURE_FRAME, PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.motion import frame_motion
+from fabric_fenicsx.loop.kinds.picture_frame.rig_terms import own_places
 from fabric_fenicsx.loop.measurement.proposal import Proposal
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 
@@ -272,6 +273,22 @@ def test_what_each_run_has_of_its_own_a_further_one_has_too():
     report = next_tests_report(found)
     assert json.loads(json.dumps(report)) == report
     assert report[0]["effects"] == ["shared", "own"] and "readings" in report[0]["columns"]
+
+
+def test_a_frame_is_put_back_to_another_place_before_a_further_run_too():
+    measurement = frame_measurement()
+    experiment = PICTURE_FRAME.experiment([measurement], (own_places("own"),))
+    by_name = {e.name: e.variants for e in experiment.effects}
+    offsets = next(v for v in by_name["load_drift"] if v.label == "offset of each run")
+    fits = []
+    for v in (*by_name["own"], offsets):
+        start = {p.name: 0.01 for p in (*experiment.baseline, *v.parameters)}
+        known = Variances(Noise(0.02))
+        fits.append(fit(experiment, (v,), start, experiment.readings.fit, known))
+    pair = ("own", fits[:1], "load_drift", fits[1:])
+    found = next_tests(experiment, PICTURE_FRAME, [measurement], [pair], 0.02)
+    # Where what was drawn leads beyond the range of the angle nothing is foretold.
+    assert found and all(0.0 < test.separation < np.inf for test in found)
 
 
 # Strips upside down ---------------------------------------------------------------------------

@@ -130,8 +130,10 @@ def to_own_places(found: Predicted, readings: Readings, places: Array) -> tuple[
     """
     force, slopes = found[0].copy(), dict(found[1])
     along, places = slopes.pop(PLACE), places.copy()
-    for run in np.unique(readings.run[along != 0.0]):
-        rows = (readings.run == run) & readings.usable
+    # Beyond the range of the angle a force, or its slope, is no number and tells nothing.
+    known = readings.usable & np.isfinite(force) & np.isfinite(along)
+    for run in np.unique(readings.run[known & (along != 0.0)]):
+        rows = (readings.run == run) & known
         J = along[rows][:, None]
         moved = np.linalg.lstsq(J, (readings.observed - force)[rows], rcond=None)[0]
         force[readings.run == run] += along[readings.run == run] * moved
