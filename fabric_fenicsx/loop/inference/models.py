@@ -175,7 +175,7 @@ class Models:
             return each_by_itself(self.experiment, with_one, lacking, known)
 
         def parts(own: Sequence[Combination]) -> list[object]:
-            # Nothing tells where one of them ends.
+            # None marks where one of them ends.
             return [part for one in own for part in (*(of for form in one for of in form), None)]
 
         numbers = ("with effects", starts, numbers_of(self.variances))

@@ -102,16 +102,19 @@ def places_of(
         recorded: the rig.
         variant: with a parameter of each fitted run.
         values: of them.
-        own: places of the other runs, (n_runs,); there is a derivative in them, see PLACE.
+        own: places of the other runs, (n_runs,); if there are any there is a derivative in these,
+            see PLACE.
     """
     shape = recorded.points["D"].value.shape
-    places, slopes = own.copy(), {PLACE: np.ones(shape)}
+    places, slopes, others = own.copy(), {}, np.ones(shape)
     for p in variant.parameters:
         assert p.run is not None
         places[p.run] = values[p.name]
-        slopes[PLACE][:, p.run] = 0.0
+        others[:, p.run] = 0.0
         slopes[p.name] = np.zeros(shape)
         slopes[p.name][:, p.run] = 1.0
+    if others.any():
+        slopes[PLACE] = others
     return Varying(np.broadcast_to(places, shape), slopes)
 
 

@@ -71,7 +71,7 @@ class Lagging(CrossingLaw):
         return size_of(of[self.by](at))
 
     def moment(self, at: Crossing) -> Any:
-        """M, exact where g, or p of what is kept, changes evenly within the step, or γ̇ does not."""
+        """M, exact where g (p, if kept) changes evenly within the step, or γ̇ and τ do not."""
         if self.by == "rate":
             left = kept(at.per_time, self._memory(at))
             moment = left * at.past("moment") + (1 - left) * self._curve(at, at.rate)

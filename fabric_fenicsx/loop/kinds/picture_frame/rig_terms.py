@@ -228,12 +228,16 @@ def _of_each_run(name: str, runs: Sequence[int]) -> Iterator[FrameVariant]:
     if len(runs) > 1:
         each = [of_run(_place(name), run) for run in runs]
         parameters, shape = each_its_own(each, "run", Y["travel"])
-        own: dict[str, Any] = {"of": ("run",), "each_run": True, "placed": True}
-        yield FrameVariant("each run its own", parameters, shape=shape, **own)
+        yield _put_back(parameters, shape)
 
 
 def _place(name: str) -> Parameter:
     return Parameter(f"{name}_mm", amplitude=True)
+
+
+def _put_back(parameters: tuple[Parameter, ...], shape: Shape | None = None) -> FrameVariant:
+    own: dict[str, Any] = {"of": ("run",), "each_run": True, "placed": True}
+    return FrameVariant("each run its own", parameters, shape=shape, **own)
 
 
 def own_places(name: str) -> Effect:
@@ -242,9 +246,8 @@ def own_places(name: str) -> Effect:
     Args:
         name: of the effect.
     """
-    form = FrameVariant("each run its own", (_place(name),), each_run=True, placed=True)
     about = "what acts on the travel, by run"
-    return Effect(name, "picture_frame", about, (form,), of_fabric=False)
+    return Effect(name, "picture_frame", about, (_put_back((_place(name),)),), of_fabric=False)
 
 
 def _at(numbers: Mapping[str, Any], reach: float, p: Values, x: Any) -> Any:
