@@ -1,5 +1,6 @@
 """Work that is shared with copies of the process: the same answers, the same objects, no trace."""
 
+import multiprocessing
 import os
 import signal
 
@@ -36,13 +37,43 @@ def made(monkeypatch):
             os.kill(number, 0)
 
 
-def test_answers_come_in_the_order_of_the_tasks_from_as_many_processes_as_cores(made):
+@pytest.fixture
+def together():
+    """To be called in a task: a process that takes its first one waits for the two others."""
+    barrier, met = multiprocessing.get_context("fork").Barrier(3), set()
+
+    def wait():
+        if os.getpid() not in met:
+            met.add(os.getpid())
+            barrier.wait(60.0)
+
+    return wait
+
+
+def test_answers_come_in_the_order_of_the_tasks_from_as_many_processes_as_cores(made, together):
+    found = in_copies(lambda k: (together(), k**2, os.getpid()), range(8))
+    assert [square for _, square, _ in found] == [k**2 for k in range(8)]
+    assert {pid for *_, pid in found} == {os.getpid(), *made}
+
+
+def test_a_process_that_is_free_takes_the_next_task(made, together):
     own = os.getpid()
-    found = in_copies(lambda k: (k**2, os.getpid()), range(8))
-    assert [square for square, _ in found] == [k**2 for k in range(8)]
-    pids = [pid for _, pid in found]
-    assert pids[::3] == [own] * 3
-    assert len(set(pids)) == 3 and pids[1] == pids[4] and pids[2] == pids[5]
+
+    def task(k):
+        together()
+        if os.getpid() != own:
+            # Until all others are done.
+            assert signal.sigtimedwait([signal.SIGUSR1], 60.0)
+        elif k == 59:
+            for copy in made:
+                os.kill(copy, signal.SIGUSR1)
+        return os.getpid()
+
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
+    try:
+        assert in_copies(task, range(60)).count(own) == 58
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGUSR1])
 
 
 def test_one_task_or_one_core_needs_no_copy(monkeypatch):
@@ -72,8 +103,9 @@ def test_what_a_copy_cannot_do_is_done_here_when_the_others_are_done(cores, monk
     put_off_in_copies()
 
 
-def test_a_copy_has_no_copies(made):
-    found = in_copies(lambda _: in_copies(lambda _: os.getpid(), range(4)), range(3))
+def test_a_copy_has_no_copies(made, together):
+    found = in_copies(lambda _: [together(), *in_copies(lambda _: os.getpid(), range(4))], range(3))
+    found = [own for _, *own in found]
     assert all(len(set(own)) == 1 for own in found)
     assert len({own[0] for own in found}) == 3
 
@@ -91,21 +123,25 @@ def test_a_large_answer_fits_through():
     assert in_copies(lambda k: bytes([k]) * 10**7, range(3))[2] == b"\2" * 10**7
 
 
-@pytest.mark.parametrize("where", [0, 1])
-def test_what_is_raised_of_a_task_is_raised_here(where, made):
+@pytest.mark.parametrize("here", [True, False])
+def test_what_is_raised_of_a_task_is_raised_here(here, made, together):
+    own = os.getpid()
+
     def strict(k):
-        if k == where:
-            raise SolveError(f"task {k}")
+        together()
+        if (os.getpid() == own) is here:
+            raise SolveError("a task")
         return k
 
-    with pytest.raises(SolveError, match=f"task {where}"):
+    with pytest.raises(SolveError, match="a task"):
         in_copies(strict, range(6))
 
 
-def test_a_copy_that_is_killed_is_an_error_and_no_answer(made):
+def test_a_copy_that_is_killed_is_an_error_and_no_answer(made, together):
     own = os.getpid()
 
     def mortal(k):
+        together()
         if os.getpid() != own:
             os.kill(os.getpid(), signal.SIGKILL)
         return k
@@ -114,10 +150,11 @@ def test_a_copy_that_is_killed_is_an_error_and_no_answer(made):
         in_copies(mortal, range(3))
 
 
-def test_an_interrupt_ends_the_copies(made):
+def test_an_interrupt_ends_the_copies(made, together):
     own = os.getpid()
 
     def slow(_):
+        together()
         if os.getpid() == own:
             raise KeyboardInterrupt
         signal.pause()

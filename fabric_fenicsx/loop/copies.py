@@ -1,10 +1,11 @@
 """Work that does not wait for other work, shared with copies of this process.
 
 A copy (fork) knows all that is known here, compiled expressions and functions of functions, which a
-process of its own would have to be told. It ends when its share is done, and what it has learnt by
-then is lost with it but for what it returns. Nothing that needs MPI or PETSc is done in one: a task
-that turns out to is put off, by whichever process has it, until the others are done. So all of
-these find what was known before, and their answers do not depend on how many processes there are.
+process of its own would have to be told. Whichever process is free takes the next task; a copy ends
+when none is left, and what it has learnt by then is lost with it but for what it returns. Nothing
+that needs MPI or PETSc is done in one: a task that turns out to is put off, by whichever process
+has it, until the others are done. So all of these find what was known before, and their answers do
+not depend on how many processes there are.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import pickle
 import signal
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from enum import Enum
 from typing import Any, BinaryIO, TypeVar
 
@@ -26,6 +27,8 @@ __all__ = ["PutOff", "in_copies", "put_off_in_copies"]
 
 #: Processes at most: a search has little that many could share, and each needs memory.
 MOST = 8
+#: Bytes of a task's number.
+NUMBER = 4
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -59,9 +62,6 @@ def in_copies(
 ) -> list[R]:
     """What a function returns of each task.
 
-    Every so many-th task is this process's, the next one the first copy's, and so on: the same ones
-    each time.
-
     Args:
         function: of a task; what it returns can be pickled, but for what is known.
         tasks: its arguments.
@@ -73,26 +73,49 @@ def in_copies(
     """
     # A copy has no copies.
     count = 1 if _is_shared else max(min(cores(), len(tasks), MOST), 1)
-    shared = list(known)
-    found: list[Any] = [None] * len(tasks)
+    shared, found = list(known), dict[int, Any]()
     copies: list[_Copy] = []
-    try:
-        for k in range(1, count):
-            copies.append(_Copy(function, tasks[k::count], shared))
-        found[::count] = _answers(function, tasks[::count])
-        for k, copy in enumerate(copies, 1):
-            found[k::count] = copy.answers(shared)
-    finally:
-        for copy in copies:
-            copy.end()
+    alone = nullcontext(iter(range(len(tasks))))
+    with _numbers(len(tasks)) if count > 1 else alone as following:
+
+        def work() -> dict[int, Any]:
+            return _answers(function, tasks, following)
+
+        try:
+            for _ in range(1, count):
+                copies.append(_Copy(work, shared))
+            found |= work()
+            for copy in copies:
+                found |= copy.answers(shared)
+        finally:
+            for copy in copies:
+                copy.end()
+    answers = [found[k] for k in range(len(tasks))]
     for k, task in enumerate(tasks):
-        if found[k] is _Answer.PUT_OFF:
-            found[k] = function(task)
-    return found
+        if answers[k] is _Answer.PUT_OFF:
+            answers[k] = function(task)
+    return answers
 
 
-def _answers(function: Callable[[T], Any], tasks: Sequence[T]) -> list[Any]:
-    """What a function returns of tasks while work is shared."""
+@contextmanager
+def _numbers(count: int) -> Iterator[Iterator[int]]:
+    """Those below a count, each to one alone of all processes that ask for the next.
+
+    A file that was open before a copy was made has one place for both, which reading moves on.
+    """
+    file = os.memfd_create("tasks", os.MFD_CLOEXEC)
+    try:
+        os.write(file, b"".join(k.to_bytes(NUMBER, "big") for k in range(count)))
+        os.lseek(file, 0, os.SEEK_SET)
+        yield (int.from_bytes(one, "big") for one in iter(lambda: os.read(file, NUMBER), b""))
+    finally:
+        os.close(file)
+
+
+def _answers(
+    function: Callable[[T], Any], tasks: Sequence[T], numbers: Iterable[int]
+) -> dict[int, Any]:
+    """What a function returns of tasks, by their numbers, while work is shared."""
 
     def answer(task: T) -> Any:
         try:
@@ -101,7 +124,7 @@ def _answers(function: Callable[[T], Any], tasks: Sequence[T]) -> list[Any]:
             return _Answer.PUT_OFF
 
     with _sharing():
-        return [answer(task) for task in tasks]
+        return {k: answer(tasks[k]) for k in numbers}
 
 
 @contextmanager
@@ -117,9 +140,7 @@ def _sharing() -> Iterator[None]:
 class _Copy:
     """A copy of the process that is at work, and the way from it."""
 
-    def __init__(
-        self, function: Callable[[T], Any], tasks: Sequence[T], shared: Sequence[object]
-    ) -> None:
+    def __init__(self, work: Callable[[], dict[int, Any]], shared: Sequence[object]) -> None:
         # A file in memory: through a pipe a copy would wait with its answers until they are wanted.
         self._file = os.memfd_create("answers", os.MFD_CLOEXEC)
         with warnings.catch_warnings():
@@ -134,13 +155,13 @@ class _Copy:
                 signal.signal(signal.SIGINT, signal.SIG_DFL)
                 signal.signal(signal.SIGTERM, signal.SIG_DFL)
                 with os.fdopen(self._file, "wb") as stream:
-                    _work(function, tasks, shared, stream)
+                    _work(work, shared, stream)
             finally:
                 os._exit(0)
         self._ended = False
 
-    def answers(self, shared: Sequence[object]) -> list[Any]:
-        """Of its tasks, when it has done them."""
+    def answers(self, shared: Sequence[object]) -> dict[int, Any]:
+        """Of the tasks that it took, when none is left."""
         os.waitpid(self._process, 0)
         self._ended = True
         os.lseek(self._file, 0, os.SEEK_SET)
@@ -151,7 +172,7 @@ class _Copy:
             raise SolveError("a copy of the process that was at work has ended") from None
         if error is not None:
             raise error
-        return list(found)
+        return dict(found)
 
     def end(self) -> None:
         """It is not waited for any more."""
@@ -163,14 +184,12 @@ class _Copy:
                 os.waitpid(self._process, 0)
 
 
-def _work(
-    function: Callable[[T], Any], tasks: Sequence[T], shared: Sequence[object], stream: BinaryIO
-) -> None:
-    """Write what a function returns of tasks, or the exception that it raised."""
-    found: list[Any] | None = None
+def _work(work: Callable[[], dict[int, Any]], shared: Sequence[object], stream: BinaryIO) -> None:
+    """Write what work returns, or the exception that it raised."""
+    found: dict[int, Any] | None = None
     error: Exception | None = None
     try:
-        found = _answers(function, tasks)
+        found = work()
     except Exception as raised:
         error = raised
     _Writer(stream, shared).dump((found, error))

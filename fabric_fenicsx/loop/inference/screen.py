@@ -39,6 +39,8 @@ BEST_PAIRS, FORMS = 12, 3
 #: Shapes of an effect that pairs are made of, those that take most off by themselves, and pairs of
 #: effects of which all of these are: the best of those with one shape of each form.
 MOST_SHAPES, MOST_PAIRS = 60, 60
+#: Shapes whose columns are made orthogonal to the baseline's at a time.
+AT_A_TIME = 200
 #: Columns of which all products are taken at once, and otherwise sets that share their products.
 MOST_COLUMNS, SETS = 4000, 300
 #: Groups of sets that are about as wide, and sets of one that are solved at once.
@@ -74,34 +76,39 @@ class Screen:
 
     def __init__(self, base: Fit, linear: ToFirstOrder, signatures: Signatures) -> None:
         self._count = int(base.used.sum())
-        columns: list[Array] = []
-        positive: list[bool] = []
         self._groups: list[_Group] = []
+        positive: list[bool] = []
+        white: list[Array] = []
         for effect, forms in signatures.items():
             for variant, shapes in forms.items():
                 for one in shapes:
                     own, signs = _columns(linear, variant, one)
                     if not np.isfinite(own).all():
                         continue
-                    places = tuple(range(len(columns), len(columns) + own.shape[1]))
-                    columns += list(own.T)
+                    places = tuple(range(len(positive), len(positive) + own.shape[1]))
+                    white.append(own)
                     positive += signs
                     names = frozenset(p.name for p in variant.parameters)
                     self._groups.append(_Group(effect, variant, one, places, names))
-        if not columns:
-            columns = [np.zeros(self._count)]
-            positive = [True]
-        C = np.column_stack(columns)
+        if not white:
+            white, positive = [np.zeros((self._count, 1))], [True]
         free = [name for name in base.values if name not in base.at_bound]
-        left = linear.beyond(free, np.column_stack([C, linear.residual]))
-        C_left, r = left[:, :-1], left[:, -1]
-        norm = np.linalg.norm(C_left, axis=0)
-        # What the baseline imitates to round-off has no signature of its own.
-        seen = norm > LEFT * np.maximum(np.linalg.norm(C, axis=0), 1e-300)
-        self._left = np.where(seen, C_left / np.where(seen, norm, 1.0), 0.0)
+        r = linear.beyond(free, linear.residual[:, None])[:, 0]
+        # Column after column, as they are asked for, and never all of them copied.
+        self._left = np.empty((len(r), len(positive)), order="F")
+        self._seen = np.empty(len(positive), dtype=bool)
+        last = 0
+        for k in range(0, len(white), AT_A_TIME):
+            some = np.concatenate(white[k : k + AT_A_TIME], axis=1)
+            first, last = last, last + some.shape[1]
+            left = linear.beyond(free, some)
+            norm = np.linalg.norm(left, axis=0)
+            # What the baseline imitates to round-off has no signature of its own.
+            seen = norm > LEFT * np.maximum(np.linalg.norm(some, axis=0), 1e-300)
+            self._left[:, first:last] = left * np.where(seen, 1.0 / np.where(seen, norm, 1.0), 0.0)
+            self._seen[first:last] = seen
         self._by, self._sum = self._left.T @ r, float(r @ r)
         self._positive = np.array(positive)
-        self._seen = seen
 
     def scores(self, effects: Sequence[Effect]) -> list[tuple[float, float]]:
         """For each effect the largest score of its forms, and the chance of such a score.
