@@ -5,7 +5,12 @@
 for a floor of one, κ being the share of a reading over the floor and T the inverse of how
 neighbours correlate: tridiagonal, as each correlates with the one before it alone, by φ to the
 power of how many places that is back (see noise). A function of G has its derivatives in κ² and φ
-by way of those in G.
+by way of those in G. Smooth lines L, which are many, are the same over σ whatever that is: of them
+
+    Lᵀ T L = Σ_b (E_b + φ²ᵇ F_b − φᵇ X_b) / (1 − φ²ᵇ)
+
+with sums over the readings that are b places from the one before, once for all: of the products of
+their own values, of those of the ones before them, and of the two with each other, both ways.
 """
 
 from __future__ import annotations
@@ -32,18 +37,31 @@ class Columns:
         lines: those of them that grow with the noise of a reading.
 
     Attributes:
-        weighted: columns times the readings' weights; the lines as they are.
-        lines: see above.
         reading: y of noise's formula, (n,).
         weight: of each reading, (n,).
         back: places from the reading before, see ``noise.steps_back``.
+        lines: L, as they are, (n, l).
+        weighted: the other columns times the readings' weights, (n, m - l).
+        among, others: places of the lines and of these among the columns.
+        steps: b of the module's docstring, those that there are.
+        sums: E, F and X of each, (l, l).
     """
 
     def __init__(self, readings: Readings, rows: Flags, columns: Array, lines: slice) -> None:
         self.reading, self.weight = readings.observed[rows], readings.weight[rows]
-        self.back, self.lines = steps_back(readings, rows), lines
-        self.weighted = columns * self.weight[:, None]
-        self.weighted[:, lines] = columns[:, lines]
+        self.back = steps_back(readings, rows)
+        every = np.arange(columns.shape[1])
+        self.among, self.others = every[lines], np.delete(every, lines)
+        self.lines = L = columns[:, lines]
+        self.weighted = columns[:, self.others] * self.weight[:, None]
+        self.steps = np.unique(self.back) if L.shape[1] else np.zeros(0, dtype=int)
+        self.sums = []
+        for step in self.steps:
+            own = np.flatnonzero(self.back == step)
+            # The first of a run has none before it, and its products are not asked for.
+            before = L[np.maximum(own - 1, 0)]
+            mixed = L[own].T @ before
+            self.sums.append((L[own].T @ L[own], before.T @ before, mixed + mixed.T))
 
 
 class White:
@@ -68,38 +86,61 @@ class White:
         square = 1.0 + (share * of.reading) ** 2
         self._along = np.where(of.back > 0, correlation**of.back, 0.0)
         self._over = 1.0 / (1.0 - self._along**2)
-        self._plain = of.weighted / np.sqrt(square)[:, None]
-        self._plain[:, of.lines] = of.weighted[:, of.lines]
+        self._plain = P = of.weighted / np.sqrt(square)[:, None]
         # T on its diagonal, and beside it but for the sign.
         self._own = self._over.copy()
         self._own[:-1] += (self._along**2 * self._over)[1:]
         self._beside = (self._along * self._over)[1:]
-        P = self._plain
-        self.products = P.T @ (self._own[:, None] * P)
+        turned = self._own[:, None] * P
         if self._beside.any():
-            mixed = P[1:].T @ (self._beside[:, None] * P[:-1])
-            self.products -= mixed + mixed.T
+            turned[1:] -= self._beside[:, None] * P[:-1]
+            turned[:-1] -= self._beside[:, None] * P[1:]
+        count = len(of.among) + len(of.others)
+        self.products = G = np.empty((count, count))
+        G[np.ix_(of.others, of.others)] = turned.T @ P
+        if len(of.among):
+            with_lines = turned.T @ of.lines
+            G[np.ix_(of.others, of.among)] = with_lines
+            G[np.ix_(of.among, of.others)] = with_lines.T
+            G[np.ix_(of.among, of.among)] = self._of_lines()
         self.determinant = float(np.sum(np.log(square / of.weight**2)) - np.sum(np.log(self._over)))
         self.ratio = float(np.sqrt(np.mean(square)))
         self.ratio_slope = float(np.mean(of.reading**2) / (2.0 * np.mean(square)))
         self.growth = of.reading**2 / (2.0 * square)
 
+    def _of_lines(self) -> Array:
+        """Lᵀ T L, (l, l)."""
+        found = np.zeros((len(self._of.among), len(self._of.among)))
+        for step, (E, F, X) in zip(self._of.steps, self._of.sums, strict=True):
+            a = self.correlation**step if step > 0 else 0.0
+            found += (E + a**2 * F - a * X) / (1.0 - a**2)
+        return found
+
     def slopes(self, by: Array) -> tuple[float, float]:
         """Derivatives of Σ by G, symmetric, and of the determinant in κ² and in φ."""
         of, along, over, P = self._of, self._along[1:], self._over[1:], self._plain
-        Q = P @ by
-        own, before = _row_by_row(Q, P), _row_by_row(Q[1:], P[:-1])
+        Q = P @ by[np.ix_(of.others, of.others)]
+        W = of.lines @ by[np.ix_(of.among, of.others)]
+        own = _row_by_row(Q + 2.0 * W, P)
+        before = _row_by_row(Q[1:] + W[1:], P[:-1]) + _row_by_row(W[:-1], P[1:])
         of_along = 2.0 * along * (own[1:] + own[:-1]) - 2.0 * (1.0 + along**2) * before
         of_along = over**2 * of_along - 2.0 * along * over
         back = np.maximum(of.back[1:], 1)
-        of_correlation = np.where(of.back[1:] > 0, back * self.correlation ** (back - 1), 0.0)
+        slope = np.where(of.back[1:] > 0, back * self.correlation ** (back - 1), 0.0)
+        of_correlation = float(of_along @ slope)
+        # The same of the lines by their sums.
+        of_lines = by[np.ix_(of.among, of.among)]
+        for step, (E, F, X) in zip(of.steps, of.sums, strict=True):
+            if step > 0:
+                a, slope = self.correlation**step, step * self.correlation ** (step - 1)
+                of_a = 2.0 * a * np.vdot(of_lines, E + F) - (1.0 + a**2) * np.vdot(of_lines, X)
+                of_correlation += float(of_a) * slope / (1.0 - a**2) ** 2
         # Lines, which are smooth over σ, do not change with it.
-        Q, P = Q[:, of.lines], P[:, of.lines]
-        turned = self._own * (own - _row_by_row(Q, P))
-        turned[1:] -= self._beside * (before - _row_by_row(Q[:-1], P[1:]))
-        turned[:-1] -= self._beside * (before - _row_by_row(Q[1:], P[:-1]))
-        of_share = 2.0 * float(self.growth.sum() - self.growth @ turned)
-        return of_share, float(of_along @ of_correlation)
+        Q += W
+        turned = self._own * _row_by_row(Q, P)
+        turned[1:] -= self._beside * _row_by_row(Q[:-1], P[1:])
+        turned[:-1] -= self._beside * _row_by_row(Q[1:], P[:-1])
+        return 2.0 * float(self.growth.sum() - self.growth @ turned), of_correlation
 
 
 def _row_by_row(one: Array, other: Array) -> Array:
