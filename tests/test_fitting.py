@@ -90,6 +90,26 @@ def test_what_the_data_do_not_tell_is_not_certain():
     assert lost.predictive_rms(out) == pytest.approx(np.std(model.residual[out]), rel=1e-6)
 
 
+def test_what_only_the_readings_left_out_depend_on_may_be_anything_if_they_tell_it():
+    line = a_line(5)
+    out = line.readings.holdout
+    # One step that is only there, of which the readings that are fitted know nothing.
+    line.columns["b"] = np.where(out & (np.arange(70) >= 55), 1.0, 0.0)
+    line.readings.observed[:] = np.random.default_rng(5).normal(size=70) + 50.0 * line.columns["b"]
+    model = fit(line, (), START, line.readings.fit, UNIT)
+    assert model.values["b"] == 0.0 and np.isinf(model.std["b"])
+    assert model.predictive_rms(out) == pytest.approx(np.sqrt(0.5 * 50.0**2), rel=0.1)
+    told = model.predictive_rms(out, open_ended=True)
+    # The mean of 40 allows for next to nothing; the step for its own mean.
+    r = model.residual[out].copy()
+    r[15:] -= r[15:].mean()
+    assert told == pytest.approx(np.sqrt(np.mean(r**2)), rel=0.03)
+    # What it can tell is nothing like a second step.
+    line.readings.observed[out] += 5.0 * np.sin(np.arange(30))
+    off = fit(line, (), START, line.readings.fit, UNIT)
+    assert off.predictive_rms(out, open_ended=True) > 3.0
+
+
 def test_what_is_no_number_is_not_foreseen():
     line, model = fitted(3)
     out = line.readings.holdout

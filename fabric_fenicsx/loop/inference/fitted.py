@@ -13,7 +13,6 @@ from scipy.stats import chi2
 
 from .effects import Variant
 from .experiment import Flags, Readings
-from .noise import Whitener
 from .variances import Variances
 
 __all__ = ["Fit", "soft_size", "uncertainty"]
@@ -90,17 +89,22 @@ class Fit:
         own = (self.residual * self.readings.weight)[rows]
         return float(np.sqrt(np.mean(own**2))) if len(own) else float("nan")
 
-    def predictive_rms(self, rows: Flags) -> float:
+    def predictive_rms(self, rows: Flags, *, open_ended: bool = False) -> float:
         """Root mean square of the residual over sigma there, less what the prediction allows for.
 
         A prediction is as uncertain as the parameters it is made with, those of a specimen that
         was not fitted among them, and its errors go together: with G Gᵀ the covariance of what is
         expected, white, r · (1 + G Gᵀ)⁻¹ r is what remains of the sum of squares. NaN if there are
         none; infinite where what is expected, or its slope, is not a number.
+
+        Args:
+            rows: there.
+            open_ended: whether what no reading that was fitted depends on may be anything; by
+                default it is known to be as it began.
         """
         if not rows.any():
             return float("nan")
-        left, _ = self._predicted(rows)
+        left, _ = self._predicted(rows, self._unseen if open_ended else ())
         return float(np.sqrt(left / rows.sum()))
 
     def predictive_likelihood(self, rows: Flags) -> float:
@@ -112,13 +116,27 @@ class Fit:
         left, determinant = self._predicted(rows)
         return left + determinant
 
-    def _predicted(self, rows: Flags) -> tuple[float, float]:
-        """For the readings there r · C⁻¹ r and ln det C, C being what a prediction scatters by."""
+    @property
+    def _unseen(self) -> list[int]:
+        """Places of parameters that no reading depends on that was fitted, but for bounds."""
+        names = enumerate(self.std.items())
+        return [k for k, (n, std) in names if np.isinf(std) and n not in self.at_bound]
+
+    def _predicted(self, rows: Flags, anything: Sequence[int] = ()) -> tuple[float, float]:
+        """For the readings there r · C⁻¹ r and ln det C, C being what a prediction scatters by.
+
+        Without what columns at some places can make, in r and in C.
+        """
         if not self._are_numbers(rows):
             return float("inf"), 0.0
         whiten = self.variances.noise.whitener(self.readings, rows)
-        r = whiten(self.residual[rows])
-        parts, size = self._along_parameters(whiten, r, rows, self.root)
+        r, changes = whiten(self.residual[rows]), whiten(self.slopes[rows] @ self.root)
+        made = whiten(self.slopes[rows][:, list(anything)])
+        along, size, _ = np.linalg.svd(made, full_matrices=False)
+        Q = along[:, size > LEAST_KNOWN * size.max(initial=0.0)]
+        r, changes = r - Q @ (Q.T @ r), changes - Q @ (Q.T @ changes)
+        along, size, _ = np.linalg.svd(changes, full_matrices=False)
+        parts = along.T @ r
         allowed = float(np.sum(parts**2 / (1.0 + 1.0 / np.maximum(size, 1e-150) ** 2)))
         determinant = whiten.log_determinant + float(np.sum(np.log1p(size**2)))
         return max(float(r @ r) - allowed, 0.0), determinant
@@ -126,13 +144,6 @@ class Fit:
     def _are_numbers(self, rows: Flags) -> bool:
         """Whether what is expected there, and its slopes, are."""
         return bool(np.isfinite(self.residual[rows]).all() and np.isfinite(self.slopes[rows]).all())
-
-    def _along_parameters(
-        self, whiten: Whitener, r: Array, rows: Flags, root: Array
-    ) -> tuple[Array, Array]:
-        """Parts of white residuals along what parameters change, and one sigma of these changes."""
-        along, size, _ = np.linalg.svd(whiten(self.slopes[rows] @ root), full_matrices=False)
-        return along.T @ r, size
 
     def chance_of(self, rows: Flags, known: Sequence[str] = ()) -> float:
         """Chance of readings as far from what is expected as these, where parameters take it.
@@ -145,8 +156,9 @@ class Fit:
         if not self._are_numbers(rows):
             return 0.0
         whiten = self.variances.noise.whitener(self.readings, rows)
-        r, root = whiten(self.residual[rows]), self._root_given(known)
-        parts, size = self._along_parameters(whiten, r, rows, root)
+        changes = whiten(self.slopes[rows] @ self._root_given(known))
+        along, size, _ = np.linalg.svd(changes, full_matrices=False)
+        parts = along.T @ whiten(self.residual[rows])
         seen = size > LEAST_KNOWN * size.max(initial=0.0)
         z = parts[seen] / np.hypot(1.0, size[seen])
         return float(chi2.sf(z @ z, int(seen.sum())))

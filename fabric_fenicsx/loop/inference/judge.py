@@ -449,7 +449,8 @@ class Judge:
         key = (model, False)
         if key not in self._validated:
             parts = stretches(self._readings, model.used)
-            self._validated[key] = cross_validated(self.experiment, model, parts)
+            # A coefficient that only one of them tells is nothing that the others foretell.
+            self._validated[key] = cross_validated(self.experiment, model, parts, open_ended=True)
         return self._validated[key]
 
     def _by_chance(self, model: Model, count: int, *, of_others: bool = False) -> float:

@@ -74,8 +74,17 @@ def parts_by(number: npt.NDArray[np.int64], rows: Flags) -> list[Flags]:
     return [rows & (number == k) for k in np.unique(number[rows])]
 
 
-def cross_validated(experiment: Experiment, model: Fit, parts: Sequence[Flags]) -> CrossValidation:
-    """Predict parts of what a model was fitted to, each from the others."""
+def cross_validated(
+    experiment: Experiment, model: Fit, parts: Sequence[Flags], *, open_ended: bool = False
+) -> CrossValidation:
+    """Predict parts of what a model was fitted to, each from the others.
+
+    Args:
+        experiment: the test.
+        model: the fit.
+        parts: of its readings.
+        open_ended: see Fit.predictive_rms.
+    """
     off = np.full(len(model.used), np.nan)
     allowed, count, failed = 0.0, 0, 0
     for part in parts:
@@ -85,7 +94,7 @@ def cross_validated(experiment: Experiment, model: Fit, parts: Sequence[Flags]) 
             continue
         size = int(part.sum())
         off[part] = (again.residual * again.readings.weight)[part]
-        allowed += size * again.predictive_rms(part) ** 2
+        allowed += size * again.predictive_rms(part, open_ended=open_ended) ** 2
         count += size
     predictive = float(np.sqrt(allowed / count)) if count else float("nan")
     return CrossValidation(off, predictive, len(parts), failed)
