@@ -120,10 +120,15 @@ class White:
         """Derivatives of Σ by G, symmetric, and of the determinant in κ² and in φ."""
         of, along, over, P = self._of, self._along[1:], self._over[1:], self._plain
         Q = P @ by[np.ix_(of.others, of.others)]
-        W = of.lines @ by[np.ix_(of.among, of.others)]
-        own = _row_by_row(Q + 2.0 * W, P)
-        before = _row_by_row(Q[1:] + W[1:], P[:-1]) + _row_by_row(W[:-1], P[1:])
-        of_along = 2.0 * along * (own[1:] + own[:-1]) - 2.0 * (1.0 + along**2) * before
+        own, before = _row_by_row(Q, P), _row_by_row(Q[1:], P[:-1])
+        # Lines have a row with the other columns, one with these before it, and after it.
+        with_lines, with_before, with_after = (np.zeros(len(P) - k) for k in (0, 1, 1))
+        if len(of.among):
+            W = of.lines @ by[np.ix_(of.among, of.others)]
+            with_lines = _row_by_row(W, P)
+            with_before, with_after = _row_by_row(W[1:], P[:-1]), _row_by_row(W[:-1], P[1:])
+        every, beside = own + 2.0 * with_lines, before + with_before + with_after
+        of_along = 2.0 * along * (every[1:] + every[:-1]) - 2.0 * (1.0 + along**2) * beside
         of_along = over**2 * of_along - 2.0 * along * over
         back = np.maximum(of.back[1:], 1)
         slope = np.where(of.back[1:] > 0, back * self.correlation ** (back - 1), 0.0)
@@ -136,10 +141,9 @@ class White:
                 of_a = 2.0 * a * np.vdot(of_lines, E + F) - (1.0 + a**2) * np.vdot(of_lines, X)
                 of_correlation += float(of_a) * slope / (1.0 - a**2) ** 2
         # Lines, which are smooth over σ, do not change with it.
-        Q += W
-        turned = self._own * _row_by_row(Q, P)
-        turned[1:] -= self._beside * _row_by_row(Q[:-1], P[1:])
-        turned[:-1] -= self._beside * _row_by_row(Q[1:], P[:-1])
+        turned = self._own * (own + with_lines)
+        turned[1:] -= self._beside * (before + with_after)
+        turned[:-1] -= self._beside * (before + with_before)
         return 2.0 * float(self.growth.sum() - self.growth @ turned), of_correlation
 
 
