@@ -21,7 +21,7 @@ from ..rigs.cases import Case
 from .inference.effects import Effect, Variant
 from .inference.experiment import Experiment
 from .inference.first_order import SMALL
-from .inference.fitting import orthogonal_to
+from .inference.fitted import orthogonal_to
 from .kinds import KINDS, kind_of
 from .measurement.kind import Kind, MadeUp
 from .measurement.reading import write_folder

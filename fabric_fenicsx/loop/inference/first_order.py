@@ -13,8 +13,8 @@ from scipy.optimize import lsq_linear
 from ...errors import SolveError
 from .effects import Parameter, Variant
 from .experiment import Experiment, each_by_itself
-from .fitted import Fit, soft_size
-from .fitting import linearised, orthogonal_to, parameters_of
+from .fitted import Fit, orthogonal_to, soft_size
+from .fitting import linearised, parameters_of
 from .variances import Variances
 
 __all__ = [

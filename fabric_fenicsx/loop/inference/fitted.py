@@ -15,7 +15,7 @@ from .effects import Variant
 from .experiment import Flags, Readings
 from .variances import Variances
 
-__all__ = ["Fit", "soft_size", "uncertainty"]
+__all__ = ["Fit", "orthogonal_to", "soft_size", "uncertainty"]
 
 Array = npt.NDArray[np.float64]
 
@@ -130,13 +130,11 @@ class Fit:
         if not self._are_numbers(rows):
             return float("inf"), 0.0
         whiten = self.variances.noise.whitener(self.readings, rows)
-        r, changes = whiten(self.residual[rows]), whiten(self.slopes[rows] @ self.root)
-        made = whiten(self.slopes[rows][:, list(anything)])
-        along, size, _ = np.linalg.svd(made, full_matrices=False)
-        Q = along[:, size > LEAST_KNOWN * size.max(initial=0.0)]
-        r, changes = r - Q @ (Q.T @ r), changes - Q @ (Q.T @ changes)
-        along, size, _ = np.linalg.svd(changes, full_matrices=False)
-        parts = along.T @ r
+        both = whiten(np.column_stack([self.residual[rows], self.slopes[rows] @ self.root]))
+        if anything:
+            both = orthogonal_to(whiten(self.slopes[rows][:, list(anything)]), both)
+        r = both[:, 0]
+        parts, size = _along(both[:, 1:], r)
         allowed = float(np.sum(parts**2 / (1.0 + 1.0 / np.maximum(size, 1e-150) ** 2)))
         determinant = whiten.log_determinant + float(np.sum(np.log1p(size**2)))
         return max(float(r @ r) - allowed, 0.0), determinant
@@ -157,8 +155,7 @@ class Fit:
             return 0.0
         whiten = self.variances.noise.whitener(self.readings, rows)
         changes = whiten(self.slopes[rows] @ self._root_given(known))
-        along, size, _ = np.linalg.svd(changes, full_matrices=False)
-        parts = along.T @ whiten(self.residual[rows])
+        parts, size = _along(changes, whiten(self.residual[rows]))
         seen = size > LEAST_KNOWN * size.max(initial=0.0)
         z = parts[seen] / np.hypot(1.0, size[seen])
         return float(chi2.sf(z @ z, int(seen.sum())))
@@ -218,6 +215,25 @@ def soft_size(r: Array, robust: float | None) -> float:
     if robust is None:
         return float(r @ r)
     return float(2.0 * robust**2 * np.sum(np.sqrt(1.0 + (r / robust) ** 2) - 1.0))
+
+
+def _along(changes: Array, r: Array) -> tuple[Array, Array]:
+    """Parts of white residuals along what parameters change, and one sigma of these changes."""
+    along, size, _ = np.linalg.svd(changes, full_matrices=False)
+    return along.T @ r, size
+
+
+def orthogonal_to(J: Array, columns: Array) -> Array:
+    """The part of columns, (n, k), that no combination of those of J, (n, m), can make."""
+    scale = np.linalg.norm(J, axis=0)
+    scale[scale == 0.0] = 1.0
+    Q, R = np.linalg.qr(J / scale)
+    keep = np.abs(np.diag(R)) > 1e-10
+    Q = Q[:, keep]
+    # Twice, for the round-off of nearly dependent columns.
+    for _ in range(2):
+        columns = columns - Q @ (Q.T @ columns)
+    return columns
 
 
 def uncertainty(J: Array) -> tuple[Array, Array, Array]:

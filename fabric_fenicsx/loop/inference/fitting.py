@@ -25,7 +25,6 @@ __all__ = [
     "fit",
     "groups_of",
     "linearised",
-    "orthogonal_to",
     "parameters_of",
 ]
 
@@ -287,16 +286,3 @@ def linearised(experiment: Experiment, model: Fit) -> Linearised:
         residual += (whole * own)[rows]
         specimens[group] = (whole[:, None] * (specimen[:, None] == everyone))[rows]
     return Linearised(residual, common[:, free][rows], specimens, model.readings, rows)
-
-
-def orthogonal_to(J: Array, columns: Array) -> Array:
-    """The part of columns, (n, k), that no combination of those of J, (n, m), can make."""
-    scale = np.linalg.norm(J, axis=0)
-    scale[scale == 0.0] = 1.0
-    Q, R = np.linalg.qr(J / scale)
-    keep = np.abs(np.diag(R)) > 1e-10
-    Q = Q[:, keep]
-    # Twice, for the round-off of nearly dependent columns.
-    for _ in range(2):
-        columns = columns - Q @ (Q.T @ columns)
-    return columns

@@ -131,15 +131,16 @@ class White:
         of_along = 2.0 * along * (every[1:] + every[:-1]) - 2.0 * (1.0 + along**2) * beside
         of_along = over**2 * of_along - 2.0 * along * over
         back = np.maximum(of.back[1:], 1)
-        slope = np.where(of.back[1:] > 0, back * self.correlation ** (back - 1), 0.0)
-        of_correlation = float(of_along @ slope)
+        by_correlation = np.where(of.back[1:] > 0, back * self.correlation ** (back - 1), 0.0)
+        of_correlation = float(of_along @ by_correlation)
         # The same of the lines by their sums.
         of_lines = by[np.ix_(of.among, of.among)]
         for step, (E, F, X) in zip(of.steps, of.sums, strict=True):
             if step > 0:
-                a, slope = self.correlation**step, step * self.correlation ** (step - 1)
+                a = self.correlation**step
                 of_a = 2.0 * a * np.vdot(of_lines, E + F) - (1.0 + a**2) * np.vdot(of_lines, X)
-                of_correlation += float(of_a) * slope / (1.0 - a**2) ** 2
+                of_a *= step * self.correlation ** (step - 1) / (1.0 - a**2) ** 2
+                of_correlation += float(of_a)
         # Lines, which are smooth over σ, do not change with it.
         turned = self._own * (own + with_lines)
         turned[1:] -= self._beside * (before + with_after)
