@@ -46,9 +46,11 @@ from .loop.kinds.cantilever.terms import strip_term as strip_term
 from .loop.kinds.cantilever.variant import StripVariant as StripVariant
 from .loop.kinds.drape.model import Drape as Drape
 from .loop.kinds.drape.variant import DrapeVariant as DrapeVariant
+from .loop.kinds.picture_frame.own_terms import own_gains as own_gains
+from .loop.kinds.picture_frame.own_terms import own_places as own_places
 from .loop.kinds.picture_frame.rig_terms import of_the_rig as of_the_rig
-from .loop.kinds.picture_frame.rig_terms import own_places as own_places
 from .loop.kinds.picture_frame.run_terms import of_the_run as of_the_run
+from .loop.kinds.picture_frame.run_terms import own_moments as own_moments
 from .loop.kinds.picture_frame.variant import FrameVariant as FrameVariant
 from .loop.report.figures import data_figure as data_figure
 from .loop.report.residuals import residual_figure as residual_figure

@@ -25,7 +25,7 @@ from fabric_fenicsx.loop.kinds.cantilever import CANTILEVER, CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
 from fabric_fenicsx.loop.kinds.picture_frame import PICTURE_FRAME, PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.motion import frame_motion
-from fabric_fenicsx.loop.kinds.picture_frame.rig_terms import own_places
+from fabric_fenicsx.loop.kinds.picture_frame.own_terms import own_places
 from fabric_fenicsx.loop.measurement.proposal import Proposal
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 

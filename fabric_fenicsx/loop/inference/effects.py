@@ -177,7 +177,7 @@ def of_the_first(v: Variant) -> Variant:
 
 
 def of_each(v: Variant, runs: Sequence[int], specimens: Sequence[int]) -> Variant:
-    """A form with parameters of their own for each run or specimen where it wants them.
+    """A form with amplitudes of their own for each run or specimen where it wants them.
 
     Args:
         v: the form; ``each_run`` or ``each_specimen`` of it says so.
@@ -186,9 +186,9 @@ def of_each(v: Variant, runs: Sequence[int], specimens: Sequence[int]) -> Varian
     """
     own: list[Parameter] = []
     if getattr(v, "each_run", False):
-        own = [of_run(p, run) for run in runs for p in v.parameters]
+        own = [*(of_run(p, run) for run in runs for p in v.amplitudes), *v.shapes]
     elif getattr(v, "each_specimen", False):
-        own = [of_specimen(p, specimen) for specimen in specimens for p in v.parameters]
+        own = [*(of_specimen(p, s) for s in specimens for p in v.amplitudes), *v.shapes]
     return replace(v, parameters=tuple(own)) if own else v
 
 

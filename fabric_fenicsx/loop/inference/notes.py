@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .diagnosis import Beside
+from .effects import Variant
 from .experiment import Another
 from .fitted import Fit
 from .judge import Judge
@@ -13,11 +14,14 @@ __all__ = ["errors_beside", "noise_source", "notes_of"]
 #: Said where a run has parameters of its own.
 OWN_ZERO = (
     "{}: in a run that is not fitted {} taken from its own readings, so that its error "
-    "tests the shape of the {}, not where it begins."
+    "tests the shape of the {}, not {}."
 )
-OF_A_CELL = "A load cell's zero, and its drift, of each run", "they are", "force"
-OF_A_FRAME = "The place that the frame was put back to before each run", "it is", "force"
-OF_A_CAMERA = "The camera's zero of each run", "it is", "strip"
+BEGINS = "where it begins"
+OF_A_CELL = "A load cell's zero, and its drift, of each run", "they are", "force", BEGINS
+OF_A_FRAME = "The place that the frame was put back to before each run", "it is", "force", BEGINS
+OF_A_MOMENT = "How much each run has of a moment", "it is", "force", "its size"
+OF_A_GAIN = "A load cell's gain in each run", "it is", "force", "its size"
+OF_A_CAMERA = "The camera's zero of each run", "it is", "strip", BEGINS
 
 
 def errors_beside(
@@ -60,11 +64,7 @@ def noise_source(judge: Judge, noise: float) -> str:
 def notes_of(judge: Judge, chosen: Fit, baseline: Fit) -> list[str]:
     """How the reported model was come by, where that limits what it says."""
     of_a_run = OF_A_CAMERA if judge.experiment.test == "cantilever" else OF_A_CELL
-    words = [
-        OF_A_FRAME if getattr(v, "placed", False) else of_a_run
-        for v in chosen.variants
-        if has_own([v])
-    ]
+    words = [_of_its_own(v, of_a_run) for v in chosen.variants if has_own([v])]
     notes = [OWN_ZERO.format(*of) for of in dict.fromkeys(words)]
     models = [(baseline, "baseline")]
     models += [(chosen, "reported model")] if chosen is not baseline else []
@@ -80,3 +80,10 @@ def notes_of(judge: Judge, chosen: Fit, baseline: Fit) -> list[str]:
                 "not be predicted from the others and are not in its error."
             )
     return notes
+
+
+def _of_its_own(v: Variant, zero: tuple[str, ...]) -> tuple[str, ...]:
+    """What each run has of its own; by default the zero of what is read."""
+    return {"place": OF_A_FRAME, "moment": OF_A_MOMENT, "gain": OF_A_GAIN}.get(
+        getattr(v, "each_run", ""), zero
+    )

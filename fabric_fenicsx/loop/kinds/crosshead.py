@@ -27,7 +27,7 @@ from ..inference.noise import estimated_noise
 from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
 from .crossing_moments import BASELINE, CrossingMoments
-from .own_of_runs import PLACE, Predicted, places_of, to_own_places, without, zeros_of
+from .own_of_runs import OTHERS, Predicted, numbers_of_runs, to_own_numbers, without, zeros_of
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
 from .recorded_rig import RecordedRig
@@ -85,6 +85,7 @@ class CrossheadTest:
             self._compiled,
             self._from_earlier_runs,
             lambda: self._recorded.each(self._before["specimen"]),
+            self._numbers_of_runs,
         )
         self._set_up(runs)
         known = self._kinematics(self._points, {})
@@ -236,6 +237,8 @@ class CrossheadTest:
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """What a term without a formula depends on, at every reading; see Experiment."""
         assert isinstance(variant, FrameVariant)
+        if variant.each_run:
+            return self.readings.run + 1.0
         if variant.by_run is not None and variant.shape is not None and not variant.shape.also:
             return self._recorded.at_readings(self._recorded.each(self._before["specimen"]).value)
         if variant.laws is None:
@@ -324,30 +327,25 @@ class CrossheadTest:
     def _common(
         self, variants: Sequence[Variant], values: Mapping[str, float]
     ) -> tuple[Array, dict[str, Array]]:
-        """The same with specimens that are alike, and frames where single runs tell they were."""
+        """The same with specimens that are alike, and numbers of runs as these alone tell them."""
         mine = [v for v in variants if isinstance(v, FrameVariant)]
-        places = np.zeros(self._points["D"].value.shape[1])
-        found = self._read(mine, values, places)
-        if PLACE not in found[1]:
+        found, added = to_own_numbers(self._read(mine, values), self.readings)
+        if not added:
             return found
-        _, places = to_own_places(found, self.readings, places)
-        return to_own_places(self._read(mine, values, places), self.readings, places)[0]
+        found, _ = to_own_numbers(self._read(mine, {**values, **added}), self.readings)
+        return found
 
-    def _read(
-        self, mine: Sequence[FrameVariant], values: Mapping[str, float], places: Array
-    ) -> Predicted:
+    def _read(self, mine: Sequence[FrameVariant], values: Mapping[str, float]) -> Predicted:
         """Crosshead forces and their derivatives.
 
         Args:
             mine: the forms of the model.
-            values: of its parameters.
-            places: by how much the frame of runs that are not fitted is ahead of the crosshead
-                [mm], (n_runs,), where those of fitted runs are found.
+            values: of its parameters; see numbers_of_runs.
         """
         travels = [v for v in mine if v.travel is not None]
         travel = self._recorded.travel(travels[0] if travels else None, values)
-        for v in (v for v in mine if v.placed):
-            own = places_of(self._recorded, v, values, places)
+        for v in (v for v in mine if v.each_run == "place"):
+            own = self._recorded.of_each(self._numbers_of_runs(v, values))
             travel = self._recorded.moved(travel, v, values, own, Varying(np.zeros(())))
         for v in (v for v in mine if v.added_travel is not None):
             travel = self._moved(v, travel, mine, values)
@@ -358,7 +356,10 @@ class CrossheadTest:
         for v in mine:
             if v.added_reading is not None:
                 read += cell * self._recorded.added(v, "reading", self._acting(whole), values)
-            if v.reading is not None and v.each_run:
+            if v.each_run == "gain":
+                gain = self._recorded.of_each(self._numbers_of_runs(v, values))
+                read += cell * self._acting(whole) * gain
+            if v.each_run == "zero":
                 left = self.readings.observed - self._recorded.at_readings(read.value)
                 of_cell = np.broadcast_to(self._on_the_load_cell, read.value.shape[1:])
                 runs = np.flatnonzero(of_cell)
@@ -371,7 +372,7 @@ class CrossheadTest:
                 read += cell * self._recorded.reading(v, values)
         force, slopes = read.value, read.slopes
         names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
-        names += [PLACE] * (PLACE in slopes)
+        names += [name for name in slopes if name.endswith(OTHERS)]
         zero = np.zeros(len(self._recorded.place[0]))
         found = {
             name: self._recorded.at_readings(slopes[name]) if name in slopes else zero
@@ -456,6 +457,12 @@ class CrossheadTest:
             {p: self._gathered(spread(slope, shape)) for p, slope in work.slopes.items()},
         )
 
+    def _numbers_of_runs(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
+        """What each run has of its own, (n_runs,); see numbers_of_runs."""
+        runs = self._points["D"].value.shape[1]
+        fitted = self.readings.run[self.readings.fit]
+        return numbers_of_runs(variant, values, runs, int(fitted.min()))
+
     def _from_earlier_runs(self, variant: FrameVariant) -> dict[str, Array]:
         """What a form's law remembers where a run begins, by name; see Marched."""
         return {}
@@ -463,11 +470,12 @@ class CrossheadTest:
     def _with_runs(self, effect: Effect) -> Effect:
         """Parameters of their own for each run that is fitted, where a form wants them."""
         runs = np.unique(self.readings.run[self.readings.fit & self.readings.first]).tolist()
-        each = [v for v in effect.variants if getattr(v, "each_run", False)]
+        each = [v for v in effect.variants if isinstance(v, FrameVariant) and v.each_run]
         shared = [v for v in effect.variants if v not in each]
         if len(np.unique(self.readings.run[self.readings.first])) == 1:
             each = []
         elif each and len(runs) == 1:
             # One fitted run cannot tell the two apart: nothing is claimed of the other runs.
             shared = [v for v in shared if getattr(v, "reading", None) is None]
-        return replace(effect, variants=tuple(of_each(v, runs, ()) for v in (*shared, *each)))
+        own = (of_each(v, v.numbered(runs), ()) for v in each)
+        return replace(effect, variants=(*shared, *own))

@@ -40,6 +40,7 @@ class CrossingMoments:
         compiled: what was compiled so far; is added to.
         first: of a form, what its laws remember where a run begins, by name; see Marched.
         run: which of its specimens' runs each record is, for forms that go by it.
+        own: what each record has of its own, from a form and its parameters, likewise.
     """
 
     def __init__(
@@ -47,8 +48,9 @@ class CrossingMoments:
         compiled: dict[Any, Marched],
         first: Callable[[FrameVariant], dict[str, Array]],
         run: Callable[[], Varying],
+        own: Callable[[FrameVariant, Mapping[str, float]], Varying],
     ) -> None:
-        self._compiled, self._first, self._run = compiled, first, run
+        self._compiled, self._first, self._run, self._own = compiled, first, run, own
         self._kept: Kept[Varying] = Kept(MOST_KEPT)
 
     def of(
@@ -73,11 +75,14 @@ class CrossingMoments:
         def made() -> Varying:
             first = {} if variant is None else self._first(variant)
             moment = self._law(variant)(known, values, first, count)["moment"]
+            if variant is not None and variant.each_run == "moment":
+                return moment * self._own(variant, values)
             if variant is None or variant.by_run is None:
                 return moment
             return moment * self._by_run(variant, values)
 
-        if not again:
+        # A run that is not fitted has a number that is none of the parameters.
+        if not again or (variant is not None and variant.each_run == "moment"):
             return made()
         own = BASELINE if variant is None else variant.parameters
         of_baseline = () if variant is None else variant.of_baseline

@@ -1,4 +1,4 @@
-"""What a run alone tells of itself: a load cell's zero, and the place a frame was put back to.
+"""What a run alone tells of itself: a load cell's zero or gain, a frame's place, its moments.
 
 A run that is fitted has parameters of these. In one that is not they are what fits its own readings
 best, so that its error tests what is beyond them.
@@ -17,7 +17,7 @@ from ..inference.experiment import Readings
 from .picture_frame.variant import FrameVariant
 from .recorded_rig import RecordedRig
 
-__all__ = ["PLACE", "Predicted", "places_of", "to_own_places", "without", "zeros_of"]
+__all__ = ["Predicted", "numbers_of_runs", "to_own_numbers", "without", "zeros_of"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -25,8 +25,8 @@ Integers = npt.NDArray[np.int64]
 Predicted = tuple[Array, dict[str, Array]]
 """Forces at every reading [N], and their derivatives, (n,) each."""
 
-PLACE = "place of a run that is not fitted"
-"""Name of a derivative in that place, of each such run in its own readings [N/mm]."""
+OTHERS = " of runs that are not fitted"
+"""How the name of a derivative ends, in each such run's own number, in its own readings."""
 
 
 def zeros_of(
@@ -93,53 +93,61 @@ def without(slope: Array, rows: Flags, J: Array) -> Array:
     return found
 
 
-def places_of(
-    recorded: RecordedRig, variant: FrameVariant, values: Mapping[str, float], own: Array
+def numbers_of_runs(
+    variant: FrameVariant, values: Mapping[str, float], runs: int, first: int
 ) -> Varying:
-    """By how much a frame is ahead of the crosshead that was put back to another place [mm].
+    """A number of each run (n_runs,).
 
     Args:
-        recorded: the rig.
-        variant: with a parameter of each fitted run.
-        values: of them.
-        own: places of the other runs, (n_runs,); if there are any there is a derivative in these,
-            see PLACE.
-    """
-    shape = recorded.points["D"].value.shape
-    places, slopes, others = own.copy(), {}, np.ones(shape)
-    for p in variant.parameters:
-        assert p.run is not None
-        places[p.run] = values[p.name]
-        others[:, p.run] = 0.0
-        slopes[p.name] = np.zeros(shape)
-        slopes[p.name][:, p.run] = 1.0
-    if others.any():
-        slopes[PLACE] = others
-    return Varying(np.broadcast_to(places, shape), slopes)
-
-
-def to_own_places(found: Predicted, readings: Readings, places: Array) -> tuple[Predicted, Array]:
-    """A prediction with frames moved to where runs that are not fitted are foretold best.
-
-    To first order, which is exact where they are moved by nothing any more.
-
-    Args:
-        found: with the derivative PLACE.
-        readings: all.
-        places: of all runs as it was made with, (n_runs,).
+        variant: with an amplitude of each fitted run, or of all but the first.
+        values: of them; of other runs those that are known, by the names that they would have.
+        runs: how many there are.
+        first: of the fitted ones, which has no number of its own if others are ``from_the_first``.
 
     Returns:
-        The prediction without that derivative, and the places [mm].
+        The numbers, with a derivative in those of runs that are not fitted if there are any; see
+        to_own_numbers.
     """
-    force, slopes = found[0].copy(), dict(found[1])
-    along, places = slopes.pop(PLACE), places.copy()
+    shared = variant.amplitudes[0].shared_name
+    found = np.array([values.get(f"run{run + 1}_{shared}", 0.0) for run in range(runs)])
+    slopes, others = {}, np.ones(runs)
+    if variant.from_the_first:
+        others[first] = 0.0
+    for p in variant.amplitudes:
+        assert p.run is not None
+        others[p.run] = 0.0
+        slopes[p.name] = (np.arange(runs) == p.run) * 1.0
+    if others.any():
+        slopes[shared + OTHERS] = others
+    return Varying(found, slopes)
+
+
+def to_own_numbers(found: Predicted, readings: Readings) -> tuple[Predicted, dict[str, float]]:
+    """A prediction with the numbers of runs that are not fitted as their readings want them.
+
+    To first order, which is exact where they are changed by nothing any more.
+
+    Args:
+        found: with derivatives in those numbers, if there are any.
+        readings: all.
+
+    Returns:
+        The prediction without these derivatives, and what was added to the numbers, by name.
+    """
+    shared = [name for name in found[1] if name.endswith(OTHERS)]
+    if not shared:
+        return found, {}
+    force, slopes, added = found[0].copy(), dict(found[1]), {}
+    along = np.column_stack([slopes.pop(name) for name in shared])
     # Beyond the range of the angle a force, or its slope, is no number and tells nothing.
-    known = readings.usable & np.isfinite(force) & np.isfinite(along)
-    for run in np.unique(readings.run[known & (along != 0.0)]):
-        rows = (readings.run == run) & known
-        J = along[rows][:, None]
-        moved = np.linalg.lstsq(J, (readings.observed - force)[rows], rcond=None)[0]
-        force[readings.run == run] += along[readings.run == run] * moved
-        places[run] += moved[0]
+    known = readings.usable & np.isfinite(force) & np.isfinite(along).all(axis=1)
+    for run in np.unique(readings.run[known & (along != 0.0).any(axis=1)]):
+        own = readings.run == run
+        rows = own & known
+        J = along[rows]
+        change = np.linalg.lstsq(J, (readings.observed - force)[rows], rcond=None)[0]
+        force[own] += along[own] @ change
         slopes = {name: without(slope, rows, J) for name, slope in slopes.items()}
-    return (force, slopes), places
+        for name, more in zip(shared, change.tolist(), strict=True):
+            added[f"run{run + 1}_{name.removesuffix(OTHERS)}"] = more
+    return (force, slopes), added

@@ -121,6 +121,13 @@ class RecordedRig:
         """A number of each run at its points."""
         return Varying(np.broadcast_to(numbers, self.points["time"].value.shape))
 
+    def of_each(self, x: Varying) -> Varying:
+        """The same of what depends on parameters, (n_runs,)."""
+        shape = self.points["time"].value.shape
+        return Varying(
+            np.broadcast_to(x.value, shape), {p: spread(s, shape) for p, s in x.slopes.items()}
+        )
+
     @cached_property
     def _since_start(self) -> Varying:
         """Time in each run [s]."""

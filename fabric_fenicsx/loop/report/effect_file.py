@@ -116,13 +116,23 @@ import fabric_fenicsx as ff
 
 EFFECTS = [ff.own_term("{name}", form="{label}")]
 """,
-    "picture_frame": """
+    "travel": """
 import fabric_fenicsx as ff
 
 EFFECTS = [ff.own_places("{name}")]
 """,
+    "reading": """
+import fabric_fenicsx as ff
+
+EFFECTS = [ff.own_gains("{name}")]
+""",
+    "moment": """
+import fabric_fenicsx as ff
+
+EFFECTS = [ff.own_moments("{name}", base="{base}")]
+""",
 }
-"""By test: what each run or specimen has of its own."""
+"""What each run or specimen has of its own, of strips, or of frames by what it acts on."""
 
 
 def effect_file(term: Discovered, titles: str) -> str:
@@ -147,8 +157,10 @@ def effect_file(term: Discovered, titles: str) -> str:
         "acts_on": term.effect.acts_on,
     }
     if shape.points:
-        text = HEAD + OF_EACH[term.effect.test]
-        return text.format(label=term.variant.label, **words)
+        strip = term.effect.test == "cantilever"
+        text = HEAD + OF_EACH["cantilever" if strip else term.effect.acts_on]
+        base = term.effect.name.partition("_")[0]
+        return text.format(label=term.variant.label, base=base, **words)
     if term.effect.test == "cantilever":
         values = _plain({p.name: term.values[p.name] for p in term.variant.parameters})
         ranges = _plain(shape.fixed["ranges"])

@@ -96,7 +96,7 @@ class PictureFrame(CrossheadTest):
         ends = self._ends()
         specimens = self._specimens
         runs = fitted.tolist() if specimens else []
-        of_one = [*terms(largest, ends, specimens, runs=runs), *run_terms(largest)]
+        of_one = [*terms(largest, ends, specimens, runs=runs), *run_terms(largest, runs)]
         return [*of_one, *products(largest, ends), *rig_products(largest)]
 
     @property

@@ -10,8 +10,8 @@ from typing import Any
 from ufl import max_value, min_value
 
 from ....inputs.parameters import Parameter
-from ...inference.effects import Effect, Shape, Values, of_run, valued
-from ..each_its_own import each_its_own
+from ...inference.effects import Effect, Shape, Values, valued
+from .own_terms import gains, places
 from .rig_variables import RIG, RIG_VARIABLES, Rig
 from .shapes import (
     Drawn,
@@ -46,7 +46,6 @@ from .variant import FrameVariant
 
 __all__ = [
     "of_the_rig",
-    "own_places",
     "rig_term",
     "rig_terms",
 ]
@@ -113,7 +112,7 @@ def rig_terms(
                 own = [*_of_each_specimen(name, specimens)]
                 # What is so at every other run may be another specimen at every other one.
                 forms = own + [form for form in forms if not (own and form.label == "by turns")]
-                forms += _of_each_run(name, runs)
+                forms += places(name, runs)
             if name == "travel_of_speed":
                 forms += _plays(name, largest)
             if name == "reading_of_force":
@@ -133,8 +132,11 @@ def rig_terms(
     for variable, by in GAINS.items():
         if variable.removesuffix("_size") in largest:
             name = f"reading_of_force_and_{by}"
-            gains = _forms("reading", name, variable, largest, ends, gain=True)
-            term = rig_term("reading", name, ("force", by), gains)
+            forms = [*_forms("reading", name, variable, largest, ends, gain=True)]
+            if variable == "run" and largest.get("run_of_specimen"):
+                # Of runs that are each a specimen it would be what these differ by.
+                forms += gains(name, runs)
+            term = rig_term("reading", name, ("force", by), forms)
             # By the displacement or the speed it is near to a moment by the angle or its rate.
             yield replace(term, of_two=by in ("displacement", "rate"))
 
@@ -221,33 +223,6 @@ def _of_each_specimen(name: str, specimens: Sequence[int]) -> Iterator[FrameVari
         shape = Shape(X["run"], Y["travel"], reach, partial(factor, own), own | {"variable": "run"})
         added = partial(_at, own, reach)
         yield of_the_rig(label, fitted(own), "travel", "run", added, shape=shape)
-
-
-def _of_each_run(name: str, runs: Sequence[int]) -> Iterator[FrameVariant]:
-    """As of a frame that is put back to another place before each run."""
-    if len(runs) > 1:
-        each = [of_run(_place(name), run) for run in runs]
-        parameters, shape = each_its_own(each, "run", Y["travel"])
-        yield _put_back(parameters, shape)
-
-
-def _place(name: str) -> Parameter:
-    return Parameter(f"{name}_mm", amplitude=True)
-
-
-def _put_back(parameters: tuple[Parameter, ...], shape: Shape | None = None) -> FrameVariant:
-    own: dict[str, Any] = {"of": ("run",), "each_run": True, "placed": True}
-    return FrameVariant("each run its own", parameters, shape=shape, **own)
-
-
-def own_places(name: str) -> Effect:
-    """The same as an effect: its numbers are found anew, no other run has the same.
-
-    Args:
-        name: of the effect.
-    """
-    about = "what acts on the travel, by run"
-    return Effect(name, "picture_frame", about, (_put_back((_place(name),)),), of_fabric=False)
 
 
 def _at(numbers: Mapping[str, Any], reach: float, p: Values, x: Any) -> Any:

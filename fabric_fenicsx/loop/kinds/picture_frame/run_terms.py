@@ -1,12 +1,14 @@
 """Terms without a formula by the run of a specimen: what changes from one of its runs to the next.
 
 base · f(run)    of a spring, a dashpot or a friction
+base · f_k       likewise, of each run k its own
 m(|γ|) g(run)    of any odd or even moment m, by the angle and the run together
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -20,22 +22,24 @@ from ....mechanics.laws.shapes import shape_of
 from ....mechanics.laws.springs import PolynomialSpring
 from ...inference.effects import Effect, Shape, Values, valued
 from ..records import FEWEST_BEFORE, FEWEST_BY_TURNS, SHARP, between_runs, one_alone
-from .shapes import X, factor, fitted, moment_shape, over_runs, shapes
+from .own_terms import OWN, found_anew, in_each
+from .shapes import X, Y, factor, fitted, moment_shape, over_runs, shapes
 from .terms import remembering
 from .variant import FrameVariant
 
-__all__ = ["of_the_run", "run_terms"]
+__all__ = ["of_the_run", "own_moments", "run_terms"]
 
 #: Most coefficients of a moment by the angle that is another one in each run.
 MOST = 3
 
 
-def run_terms(largest: Mapping[str, float]) -> Iterator[Effect]:
+def run_terms(largest: Mapping[str, float], runs: Sequence[int] = ()) -> Iterator[Effect]:
     """The terms.
 
     Args:
         largest: sizes of the variables, see terms.ranges_of, and "run_of_specimen", how many runs
             were before the last one: with less than two, or none given, there are no terms.
+        runs: those that are fitted, counted from 0, if they are of one folder.
     """
     last = largest.get("run_of_specimen", 0.0)
     if last < FEWEST_BEFORE:
@@ -56,12 +60,32 @@ def run_terms(largest: Mapping[str, float]) -> Iterator[Effect]:
             forms.append(
                 of_the_run(label, fitted(own), base, share, stick_angle=stick, shape=shape)
             )
+        forms += in_each(_own(name, base), runs, Y.get(base, "moment_N"))
         yield _effect(name, f"{base} moment, by the run of a specimen", ("run", *also), forms)
     for base in ("odd", "even"):
         name = f"{base}_moment_of_angle_and_run"
         forms = [*_by_the_angle(name, base, last, largest["angle"])]
         about = f"{base} moment, by the angle and the run of a specimen together"
         yield _effect(name, about, ("angle", "run"), forms, of_two=True)
+
+
+def _own(name: str, base: str) -> FrameVariant:
+    """As of a sheet that is clamped anew before each run: the number of one."""
+    own, also = Parameter(f"{name}_own", amplitude=True), remembering(name, base, "run", {})
+    stick = also.get("stick_angle", 0.0)
+    form = of_the_run(OWN, (own, *also.values()), base, None, stick_angle=stick)
+    # The baseline has a spring and a dashpot, those of the first run.
+    return replace(form, each_run="moment", from_the_first=base not in FRICTION)
+
+
+def own_moments(name: str, base: str) -> Effect:
+    """What each run has of a moment as an effect.
+
+    Args:
+        name: of the effect.
+        base: "elastic", "viscous" or "dissipative".
+    """
+    return found_anew(name, f"{base} moment, by the run", _own(name, base))
 
 
 def _effect(
@@ -131,7 +155,7 @@ def of_the_run(
     label: str,
     parameters: tuple[Parameter, ...],
     base: str,
-    share: Callable[[Values, Any], Any],
+    share: Callable[[Values, Any], Any] | None,
     *,
     stick_angle: Any = 0.0,
     curve: Any = (),
@@ -145,7 +169,8 @@ def of_the_run(
         parameters: its numbers.
         base: "elastic", of the spring, "viscous", of the rate, "dissipative", a friction of 1,
             "odd" or "even", of a curve of the angle.
-        share: how many times that is added, from the parameters and how many runs were before.
+        share: how many times that is added, from the parameters and how many runs were before;
+            None: as each run has it.
         stick_angle: of a friction [rad], or the parameter that is one.
         curve: coefficients of a spline over the angle, some of them parameters.
         reach: where that ends [rad].

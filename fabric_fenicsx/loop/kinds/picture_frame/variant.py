@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 from ....mechanics.laws.law import CrossingLaw, Form
 from ...inference.effects import Effect, Values, Variant
@@ -20,7 +20,8 @@ class FrameVariant(Variant):
 
     Attributes:
         laws: laws of a crossing (mechanics.laws) whose moments per area of fabric [N] add.
-        by_run: factor of these, from the parameters and how many runs of its specimen were before.
+        by_run: factor of these, from the parameters and how many runs of its specimen were before;
+            with ``each_run`` it is the parameter of the run.
         travel: true crosshead displacement [mm] from the parameters, the crosshead's place D [mm]
             and the true displacement at the reading before, None unless ``remembers_travel``.
         reading: what the load cell adds [N] at the time t [s].
@@ -45,10 +46,12 @@ class FrameVariant(Variant):
         rounds: steps of Newton's in which ``added_travel`` is found with the force that it leaves;
             0: with that without it.
         in_series: ... and at the rate that it leaves, as what gives way at once does.
-        each_run: it has parameters of its own in each run, as the zero of a load cell has. Those of
-            a holdout run can only come from that run: its error is then what is left after them.
-        placed: they are by how much the frame is ahead of the crosshead [mm], as one is that was
-            put back to another place before each run.
+        each_run: what it has parameters of in each run, empty if nothing: the "zero" of a load cell
+            (``reading``) or its "gain", more than 1, the "place" that the frame was put back to
+            before, by how much it is ahead of the crosshead [mm], or how much there is of the
+            "moment" of ``laws``. Those of a holdout run can only come from that run: its error is
+            then what is left after them.
+        from_the_first: ... but in the first that is fitted, from which the others differ by these.
     """
 
     laws: Callable[[Values], tuple[Any, ...]] | None = None
@@ -67,8 +70,12 @@ class FrameVariant(Variant):
     of_baseline: tuple[str, ...] = ()
     rounds: int = 0
     in_series: bool = False
-    each_run: bool = False
-    placed: bool = False
+    each_run: Literal["", "zero", "gain", "place", "moment"] = ""
+    from_the_first: bool = False
+
+    def numbered(self, runs: Sequence[int]) -> Sequence[int]:
+        """Those of the fitted runs that have a number of their own."""
+        return runs[1:] if self.from_the_first else runs
 
     @property
     def adds_up(self) -> bool:
