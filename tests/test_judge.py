@@ -333,9 +333,13 @@ def test_a_form_at_the_edge_may_stand_for_another_law(bound, rivals):
     assert said.rivals["bend"] == rivals
 
 
-@pytest.mark.parametrize(("bound", "found", "rival"), [(0.7, "round", "bend"), (5.0, "bend", "")])
+@pytest.mark.parametrize(
+    ("bound", "found", "rival"),
+    [(0.7, "round", "bend"), (1.03, "round", "bend"), (5.0, "bend", "")],
+    ids=["at a bound", "near one", "between them"],
+)
 def test_what_lacks_what_its_name_says_is_a_rival_of_the_other(bound, found, rival):
-    """Where the number that it is named by ends at a bound, and another law does about as well."""
+    """Where what it is named by is not told from a bound, and another law does about as well."""
     said = diagnose_test(curved("round", 60.0, more=1.0, bound=bound, essential=True))
     assert [e.name for e in said.effects] == [found]
     assert said.rivals[found] == [rival] * bool(rival)

@@ -26,7 +26,7 @@ class Parameter:
             "moment", the largest of them in the fitted baseline.
         jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
             for on both sides.
-        essential: whether its effect is what its name says only where this one is inside its
+        essential: whether its effect is what its name says only where this one is told from its
             bounds: relaxation in no time is a dashpot's.
         of_model: whether it says which model of the rig is nearer, and nothing of the fabric: the
             same for all specimens.

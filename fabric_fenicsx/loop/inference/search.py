@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from .criteria import CRITERIA
 from .diagnosis import Diagnosis
-from .effects import Effect
+from .effects import Effect, Parameter
 from .experiment import Experiment
 from .fitted import Fit
 from .in_common import InCommon
@@ -94,7 +94,8 @@ def _doubt(search: Search, further: Search) -> _Doubt | None:
     own = [effect.name for effect in chosen.effects]
     alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
     in_its_way = experiment.each_its_own_way and search.specimens_differ
-    doubtful = in_its_way or _at_the_edge(chosen.fit) or search.judge.uneven(chosen.fit)
+    doubtful = in_its_way or search.judge.uneven(chosen.fit)
+    doubtful |= _at_the_edge(chosen.fit) or _lacks_what_its_name_says(chosen.fit)
     rivals = bool(own) and (experiment.terms_are_rivals or doubtful)
     single = [term for term in experiment.terms if not term.of_two]
     if len(own) > 1:
@@ -227,9 +228,22 @@ def _at_the_edge(model: Fit) -> bool:
 
 
 def _lacks_what_its_name_says(model: Fit) -> bool:
-    """Whether what its effects are named by is at a bound; see Parameter.essential."""
-    named_by = {p.name for v in model.variants for p in v.parameters if p.essential}
-    return bool(named_by & set(model.at_bound))
+    """Whether what an effect is named by is not told from a bound; see Parameter.essential.
+
+    An effect of several parts lacks it where that is so of as many as there are.
+    """
+
+    def told(p: Parameter) -> bool:
+        away = min(model.values[p.name] - p.lower, p.upper - model.values[p.name])
+        return p.name not in model.at_bound and away > CRITERIA.significant * model.std[p.name]
+
+    for v in model.variants:
+        named_by = [p for p in v.parameters if p.essential]
+        untold = sum(not told(p) for p in named_by)
+        there = sum(p.name not in model.at_bound for p in v.amplitudes)
+        if untold and untold >= there:
+            return True
+    return False
 
 
 def _beside(further: Diagnosis, found: Diagnosis) -> Diagnosis:

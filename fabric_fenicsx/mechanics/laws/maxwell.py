@@ -25,6 +25,7 @@ SHORTEST = Parameter(
     0.2,
     meaning="shortest relaxation time",
     share_of="duration",
+    essential=True,
 )
 
 
