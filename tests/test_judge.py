@@ -263,6 +263,32 @@ def test_three_names_do_not_stand_for_one_of_them_and_a_term(truth, found):
     assert {e.name for e in diagnose_test(test).effects} == found
 
 
+@pytest.mark.parametrize(
+    ("in_general", "found"), [((), {"both"}), (("bow",), {"bow", "step"})], ids=["no", "one"]
+)
+def test_two_names_stand_where_a_term_that_is_one_of_them_is_no_better(in_general, found):
+    """The term nearly is what the two are together, with a number less."""
+    t = np.tile(np.linspace(0.0, 1.0, 120), 3)
+    columns = {"a": np.ones_like(t), "b": t, "bow": t**4}
+    columns["step"] = 1.0 / (1.0 + np.exp(-(t - 0.5) / 0.05))
+    names = columns["step"] + 2.0 * columns["bow"]
+    columns["both"] = names + 0.0025 * np.sin(9.0 * np.pi * t)
+    observed = 1.0 + 2.0 * t + names + 0.01 * np.random.default_rng(4).normal(size=len(t))
+    columns["none"] = np.random.default_rng(5).normal(size=len(t))
+    data = readings(observed, run=np.repeat(np.arange(3), 120))
+    test = Linear(data, columns, ("a", "b"), noise=0.01)
+    test.effects = [linear_effect(name) for name in ("bow", "step", "none")]
+    term = replace(linear_effect("both", acts_on="moment"), in_general=in_general)
+    test.terms, test.terms_are_rivals, test.each_its_own_way = [term], False, False
+    said = diagnose_test(test)
+    assert {e.name for e in said.effects} == found
+    assert {name for names_of in said.rivals.values() for name in names_of} == {
+        "both",
+        "bow",
+        "step",
+    } - found
+
+
 def curved(truth, sigmas, more=0.0, bound=np.inf, imitated=None, essential=False):
     """A line with a bend in it, or a round one: an effect is the bend, a term the round one.
 

@@ -144,6 +144,9 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
         # It may stand for another law as well as they, or is no simpler than two of them.
         least = CRITERIA.decisive
     one = other.effects[0] if len(other.effects) == 1 else None
+    if one is not None and found.effects and {e.name for e in found.effects} & {*one.in_general}:
+        # It is one of them, whatever its shape, which may stand for the others as well.
+        least = max(least, 0.0)
     if single.accounted and one is not None and not one.listed:
         if gain > least:
             return _in_their_place(search, further, single, gain)
