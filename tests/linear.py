@@ -83,6 +83,9 @@ class Linear:
     def settle(self, variants, values):
         pass
 
+    def reached(self, terms, values):
+        return np.ones(len(self.readings.observed), dtype=bool)
+
     def added_alike(self, variant, variants):
         return False
 

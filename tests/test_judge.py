@@ -229,6 +229,30 @@ def test_where_held_out_runs_contradict_one_term_beside_slow_noise_two_are_tried
 
 
 @pytest.mark.parametrize(
+    ("within", "verdict"), [(0.6, "effect_discovered"), (1.0, "unexplained"), (0.1, "unexplained")]
+)
+def test_a_term_is_judged_where_the_fitted_runs_reached(within, verdict):
+    """It is wrong in the last two fifths of the run that is held out, which may tell nothing."""
+    rng = np.random.default_rng(5)
+    t = np.tile(np.linspace(0.0, 1.0, 120), 4)
+    run = np.repeat(np.arange(4), 120)
+    beyond = (run == 3) & (t > 0.6)
+    columns = {"a": np.ones_like(t), "b": t, "wave": np.sin(9.0 * t), "kink": t**4}
+    observed = 100.0 + 2.0 * t + columns["wave"] + 0.03 * rng.normal(size=len(t)) + 0.2 * beyond
+    test = Linear(readings(observed, run=run, holdout=(3,)), columns, ("a", "b"), noise=0.03)
+    test.effects, test.terms = [linear_effect("kink")], [linear_effect("wave", acts_on="moment")]
+    test.terms_are_rivals = test.each_its_own_way = False
+    test.reached = lambda terms, values: (run < 3) | (t < within)
+    found = diagnose_test(test)
+    assert found.verdict == verdict
+    said = [note for note in found.notes if "48 of 120 held-out readings" in note]
+    assert len(said) == (verdict == "effect_discovered")
+    # The error that is printed is of all of them.
+    best = found.holdout_best
+    assert best > 3.0 * 0.03
+
+
+@pytest.mark.parametrize(
     ("truth", "found"),
     [
         ("term", {"wave", "term"}),

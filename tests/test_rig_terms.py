@@ -678,3 +678,21 @@ def same_from_its_file(tmp_path, experiment, effect, variant, values):
     assert np.abs(expected - without).max() > 2.0 * NOISE
     same, _ = experiment.predict((form,), values | {"discovered_1_amount": 1.0})
     assert same == pytest.approx(expected, abs=1e-12)
+
+
+def test_what_a_term_depends_on_is_reached_as_far_as_in_the_fitted_runs(tmp_path):
+    """The third run, held out, turns ten times as fast at its end as any that is fitted."""
+    runs = MORE | {"c": (*LAST[:-1], (4.0, 0.0))}
+    write(tmp_path / "set", wearing_spring, runs)
+    file = tmp_path / "set" / "measurement.yaml"
+    file.write_text(file.read_text().replace("c.csv, role: fit", "c.csv, role: holdout"))
+    experiment = PictureFrame([read_measurement(tmp_path / "set")])
+    speed = one_of(experiment, "reading_of_speed", "linear")
+    angle = one_of(experiment, "viscous_moment_of_angle", "angle, linear")
+    last = experiment.readings.run == 2
+    fast = last & (experiment.readings.covariates["time [s]"] > 160.5)
+    values = BASE | {p.name: 0.01 for v in (speed, angle) for p in v.parameters}
+    assert experiment.reached((angle,), values).all()
+    for terms in ((speed,), (angle, speed)):
+        reached = experiment.reached(terms, values)
+        assert not reached[fast].any() and reached[~last].all() and reached[last & ~fast].any()

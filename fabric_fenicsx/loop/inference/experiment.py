@@ -276,6 +276,15 @@ class Experiment(Protocol):
         """
         ...
 
+    def reached(self, terms: Sequence[Variant], values: Mapping[str, float]) -> Flags:
+        """Readings where what terms depend on is within what it is in the fitted ones, (n,).
+
+        Args:
+            terms: forms of ``terms``.
+            values: of the parameters of a model with them.
+        """
+        ...
+
     def predict(
         self,
         variants: Sequence[Variant],

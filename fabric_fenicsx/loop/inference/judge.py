@@ -115,6 +115,19 @@ class Judge:
         """Readings of holdout runs that an error is reported for."""
         return self._readings.holdout & self._readings.usable & ~self.outliers
 
+    def foretold_rows(self, model: Model) -> Flags:
+        """Readings of holdout runs that say whether a model is right.
+
+        What terms without a formula are where nobody fitted them nobody knows: they are judged
+        where the fitted runs reached, unless that is less than is left out at a time otherwise.
+        """
+        out = self.held_rows
+        terms = [v for v, e in zip(model.fit.variants, model.effects, strict=True) if not e.listed]
+        if not terms or not out.any():
+            return out
+        within = out & self.experiment.reached(terms, model.fit.values)
+        return within if CRITERIA.blocks * within.sum() >= out.sum() else out
+
     def leave_out(self, model: Fit) -> bool:
         """Leave out readings that stand out from a model; whether others are fitted than before."""
         noise = model.variances.noise
@@ -266,18 +279,17 @@ class Judge:
         without a formula, or an effect that is another one in each specimen, that makes them less
         likely, or expects a larger error, at all.
         """
-        out = self.held_rows
+        out = self.foretold_rows(model)
         if out.any() and model is not baseline:
             both = [model.fit, baseline.fit]
             mine, other = (m.predictive_likelihood(out) for m in both)
-            expected = [self.expected_holdout(m, m.rms(m.used)) for m in both]
+            expected = [self._expected(m, out, m.rms(m.used)) for m in both]
+            error, before = (self.holdout(m, out & self._readings.first) for m in both)
             known = all(effect.listed for effect in model.effects) and not self.uneven(model.fit)
             times, more = (CRITERIA.significant, CRITERIA.decisive) if known else (1.0, 0.0)
             # An exponent that few rates tell expects anything at another one, and may be right.
-            nearer = known and CRITERIA.significant * self.holdout(model.fit) < self.holdout(
-                baseline.fit
-            )
-            off = self.holdout(model.fit) > CRITERIA.significant * self.misfit(model).noise
+            nearer = known and CRITERIA.significant * error < before
+            off = error > CRITERIA.significant * self.misfit(model).noise
             vague = expected[0] >= times * expected[1] and off and not nearer
             if vague or mine >= other + more:
                 return False
@@ -318,15 +330,16 @@ class Judge:
 
     def foretells(self, model: Model, *, roughly: bool = False) -> bool:
         """Whether a model predicts what was left out, as well as its parameters are known."""
-        out = self.held_rows
+        out = self.foretold_rows(model)
         if out.any():
             error = model.fit.predictive_rms(out)
             count = int(out.sum())
             # One specimen's deviation is a single number, however many readings share it.
             known = self._known_of(model)
-            expected = self.expected_holdout(model.fit, self.misfit(model).noise, known)
+            expected = self._expected(model.fit, out, self.misfit(model).noise, known)
             if (
-                self.holdout(model.fit) > CRITERIA.significant * expected
+                self.holdout(model.fit, out & self._readings.first)
+                > CRITERIA.significant * expected
                 and model.fit.chance_of(out, known) < CRITERIA.structure_p
             ):
                 return False
@@ -413,13 +426,14 @@ class Judge:
         out, own = self.held_rows, self._readings.first if rows is None else rows
         return model.rms(out & own) if out.any() else self.left_out(model).error(own)
 
-    def expected_holdout(self, model: Fit, noise: float, known: Sequence[str] = ()) -> float:
-        """What the model itself expects the held-out error of holdout runs to be; NaN without.
+    def expected_holdout(self, model: Fit, noise: float) -> float:
+        """What the model itself expects the held-out error of holdout runs to be; NaN without."""
+        return self._expected(model, self.held_rows, noise)
 
-        As if some common parameters were known to be as found.
-        """
-        out = self.held_rows & self._readings.first
-        return float(np.hypot(noise, model.prediction_std(out, known))) if out.any() else np.nan
+    def _expected(self, model: Fit, out: Flags, noise: float, known: Sequence[str] = ()) -> float:
+        """The same of some readings, as if some common parameters were known to be as found."""
+        own = out & self._readings.first
+        return float(np.hypot(noise, model.prediction_std(own, known))) if own.any() else np.nan
 
     @property
     def source(self) -> str:

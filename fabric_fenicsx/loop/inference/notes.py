@@ -6,7 +6,7 @@ from .diagnosis import Beside
 from .effects import Variant
 from .experiment import Another
 from .fitted import Fit
-from .judge import Judge
+from .judge import Judge, Model
 from .validation import has_own
 
 __all__ = ["errors_beside", "noise_source", "notes_of"]
@@ -17,6 +17,12 @@ OWN_ZERO = (
     "tests the shape of the {}, not {}."
 )
 BEGINS = "where it begins"
+#: Said where held-out readings do not tell of a term.
+BEYOND = (
+    "{} of {} held-out readings are where what a term depends on is beyond what the fitted runs "
+    "reached. What it is there nobody knows: held-out errors are of all readings, the verdict goes "
+    "by the others."
+)
 OF_A_CELL = "A load cell's zero, and its drift, of each run", "they are", "force", BEGINS
 OF_A_FRAME = "The place that the frame was put back to before each run", "it is", "force", BEGINS
 OF_A_MOMENT = "How much each run has of a moment", "it is", "force", "its size"
@@ -61,11 +67,15 @@ def noise_source(judge: Judge, noise: float) -> str:
     return source
 
 
-def notes_of(judge: Judge, chosen: Fit, baseline: Fit) -> list[str]:
+def notes_of(judge: Judge, final: Model, baseline: Fit) -> list[str]:
     """How the reported model was come by, where that limits what it says."""
+    chosen = final.fit
     of_a_run = OF_A_CAMERA if judge.experiment.test == "cantilever" else OF_A_CELL
     words = [_of_its_own(v, of_a_run) for v in chosen.variants if has_own([v])]
     notes = [OWN_ZERO.format(*of) for of in dict.fromkeys(words)]
+    held, told = (int(rows.sum()) for rows in (judge.held_rows, judge.foretold_rows(final)))
+    if told < held:
+        notes.append(BEYOND.format(held - told, held))
     models = [(baseline, "baseline")]
     models += [(chosen, "reported model")] if chosen is not baseline else []
     for model, name in models:

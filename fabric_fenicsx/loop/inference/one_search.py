@@ -164,7 +164,7 @@ class Search:
             of_the_curve=of_the_curve,
             others=errors_beside(self.judge, baseline.fit, final.fit, nearest.fit, misfit.noise),
             laboratories=tuple(laboratories(self.experiment, judged.fit, misfit.noise)),
-            notes=[*self.experiment.notes, *notes_of(self.judge, final.fit, baseline.fit)],
+            notes=[*self.experiment.notes, *notes_of(self.judge, final, baseline.fit)],
         )
         return self.found
 

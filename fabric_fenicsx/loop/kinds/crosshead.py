@@ -251,6 +251,19 @@ class CrossheadTest:
         variable = self._moments.variable(variant, self._kinematics(self._points, {}), values)
         return self._shown(variable.value)
 
+    def reached(self, terms: Sequence[Variant], values: Mapping[str, float]) -> Flags:
+        """Readings where what terms depend on is within what was fitted; see Experiment."""
+        rows = self.readings.fit
+        found = np.ones(len(rows), dtype=bool)
+        for v in terms:
+            if v.shape is None or v.shape.also or v.shape.points:
+                continue
+            along = self.along(v, values)
+            low, high = float(along[rows].min()), float(along[rows].max())
+            more = LITTLE * (high - low)
+            found &= (along > low - more) & (along < high + more)
+        return found
+
     def _ranges(self) -> dict[str, float]:
         """Largest values in the fitted readings of what terms without a formula depend on.
 

@@ -43,6 +43,7 @@ from .variant import StripVariant
 __all__ = ["Cantilever"]
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 #: C1 is looked for within this factor of its start.
 REACH = 1e3
@@ -250,6 +251,10 @@ class Cantilever:
     def added_alike(self, variant: Variant, variants: Sequence[Variant]) -> bool:
         """False: strips hang by all that bends them; see Experiment."""
         return False
+
+    def reached(self, terms: Sequence[Variant], values: Mapping[str, float]) -> Flags:
+        """All: a strip hangs by all of its places; see Experiment."""
+        return np.ones(len(self.readings.observed), dtype=bool)
 
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """What a term without a formula depends on, at every reading; see Experiment."""

@@ -54,6 +54,7 @@ from .variant import DrapeVariant
 __all__ = ["Drape"]
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 #: Cells between two crossings.
 MESH = 2
@@ -310,6 +311,10 @@ class Drape:
     def added_alike(self, variant: Variant, variants: Sequence[Variant]) -> bool:
         """False: they share the angles; see Experiment."""
         return False
+
+    def reached(self, terms: Sequence[Variant], values: Mapping[str, float]) -> Flags:
+        """All: there are no such terms of a drape; see Experiment."""
+        return np.ones(len(self.readings.observed), dtype=bool)
 
     def along(self, variant: Variant, values: Mapping[str, float]) -> Array:
         """Nothing: there are no such terms of a drape."""
