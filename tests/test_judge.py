@@ -229,6 +229,29 @@ def test_where_held_out_runs_contradict_one_term_beside_slow_noise_two_are_tried
 
 
 @pytest.mark.parametrize(
+    ("looked", "found", "stated"),
+    [
+        (True, {"big", "small"}, None),
+        (False, {"big"}, None),
+        (True, {"big", "small"}, SIGMA),
+    ],
+)
+def test_a_misfit_is_no_noise_where_no_term_may_tell_why(monkeypatch, looked, found, stated):
+    """One more effect is looked for; or not, and what the second one does is said to be noise."""
+    t = np.tile(np.linspace(0.0, 1.0, 60), 3)
+    columns = {"a": np.ones_like(t), "big": t**2, "small": np.sin(40.0 * t)}
+    seen = 60.0 * columns["big"] + 1.3 * columns["small"]
+    noise = np.random.default_rng(7).normal(size=len(t))
+    data = readings(1.0 + SIGMA * (seen + noise), run=np.repeat(np.arange(3), 60))
+    effects = [linear_effect("big"), linear_effect("small")]
+    test = Linear(data, columns, ("a",), effects=effects, noise=stated)
+    test.terms = []
+    if not looked:
+        monkeypatch.setattr(Judge, "unsaid", lambda self, model: False)
+    assert {e.name for e in diagnose_test(test).effects} == found
+
+
+@pytest.mark.parametrize(
     ("within", "verdict"), [(0.6, "effect_discovered"), (1.0, "unexplained"), (0.1, "unexplained")]
 )
 def test_a_term_is_judged_where_the_fitted_runs_reached(within, verdict):

@@ -234,6 +234,17 @@ class Judge:
             return model.estimate.variances.noise.correlation > slow
         return self.misfit(model).reading > CRITERIA.scatter * self.given
 
+    def unsaid(self, model: Model) -> bool:
+        """Whether a misfit passes for noise, and there is no term without a formula to tell why.
+
+        It is more than was stated, or has structure.
+        """
+        if self.experiment.terms:
+            return False
+        found = self.misfit(model)
+        more = self.given is not None and found.reading > CRITERIA.scatter * self.given
+        return more or found.whiteness.structured
+
     def slow_noise(self, model: Model) -> bool:
         """Whether noise that was not stated is so slow that it looks like a misfit."""
         return self.given is None and (
@@ -364,7 +375,7 @@ class Judge:
         found = self.misfit(model)
         little = model.fit.rms(model.fit.used) < CRITERIA.settled * found.noise
         quiet = little or not found.whiteness.structured
-        return bool(quiet) and self.accounts(model, baseline)
+        return bool(quiet) and not self.unsaid(model) and self.accounts(model, baseline)
 
     def accounts(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise in what it was fitted to, whatever holdout runs say.
