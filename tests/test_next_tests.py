@@ -25,7 +25,8 @@ from fabric_fenicsx.loop.kinds.cantilever import CANTILEVER, CantileverRig
 from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
 from fabric_fenicsx.loop.kinds.picture_frame import PICTURE_FRAME, PictureFrameRig
 from fabric_fenicsx.loop.kinds.picture_frame.motion import frame_motion
-from fabric_fenicsx.loop.kinds.picture_frame.own_terms import own_places
+from fabric_fenicsx.loop.kinds.picture_frame.own_terms import own_gains, own_places
+from fabric_fenicsx.loop.kinds.picture_frame.run_terms import own_moments
 from fabric_fenicsx.loop.measurement.proposal import Proposal
 from fabric_fenicsx.loop.measurement.schema import FabricKeys, Measurement, Run
 
@@ -275,9 +276,14 @@ def test_what_each_run_has_of_its_own_a_further_one_has_too():
     assert report[0]["effects"] == ["shared", "own"] and "readings" in report[0]["columns"]
 
 
-def test_a_frame_is_put_back_to_another_place_before_a_further_run_too():
+@pytest.mark.parametrize(
+    "own",
+    [own_places("own"), own_gains("own"), own_moments("own", "elastic")],
+    ids=["place", "gain", "spring"],
+)
+def test_a_number_of_each_run_is_another_one_in_a_further_run_too(own):
     measurement = frame_measurement()
-    experiment = PICTURE_FRAME.experiment([measurement], (own_places("own"),))
+    experiment = PICTURE_FRAME.experiment([measurement], (own,))
     by_name = {e.name: e.variants for e in experiment.effects}
     offsets = next(v for v in by_name["load_drift"] if v.label == "offset of each run")
     fits = []

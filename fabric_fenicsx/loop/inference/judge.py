@@ -239,7 +239,7 @@ class Judge:
 
         It is more than was stated, or has structure.
         """
-        if self.experiment.terms:
+        if self.experiment.terms or self.experiment.curves_only:
             return False
         found = self.misfit(model)
         more = self.given is not None and found.reading > CRITERIA.scatter * self.given
