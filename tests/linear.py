@@ -70,6 +70,7 @@ class Linear:
         self.readings, self.columns = data, columns
         self.baseline = tuple(Parameter(name, (0.0,)) for name in baseline)
         self.effects, self.noise = list(effects), noise
+        self.terms = [e for e in effects if not e.listed]
 
     def predict(self, variants, values, deviations=NO_DEVIATIONS):
         names = [p.name for p in (*self.baseline, *(p for v in variants for p in v.parameters))]
