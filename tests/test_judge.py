@@ -249,6 +249,10 @@ def test_a_misfit_is_no_noise_where_no_term_may_tell_why(monkeypatch, looked, fo
     if not looked:
         monkeypatch.setattr(Judge, "unsaid", lambda self, model: False)
     assert {e.name for e in diagnose_test(test).effects} == found
+    test.effects = effects[:1]
+    test.readings = replace(data, observed=1.0 + SIGMA * (0.9 * columns["small"] + noise))
+    alone = diagnose_test(test)
+    assert not alone.effects and alone.verdict == ("unexplained" if looked else "no_effect")
 
 
 @pytest.mark.parametrize(

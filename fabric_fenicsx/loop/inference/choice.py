@@ -68,7 +68,8 @@ def _bearing_scrutiny(judge: Judge, level: Sequence[Model], fewer: Sequence[Mode
 def verdict_on(judge: Judge, baseline: Model, chosen: Model) -> Verdict:
     """What a report says first; see docs/diagnosis.md."""
     if not chosen.effects:
-        return "no_effect" if judge.explains(baseline, baseline) else "unexplained"
+        quiet = judge.explains(baseline, baseline) and not judge.unsaid(baseline)
+        return "no_effect" if quiet else "unexplained"
     if judge.experiment.curves_only:
         # Every effect can be such curves: none is told from the others.
         return "unexplained"
