@@ -236,7 +236,7 @@ def _laboratories(report: Mapping[str, Any]) -> Iterator[str]:
         error, expected = (100.0 * lab[key] / lab["size"] for key in ("foretold", "expected"))
         found.append(f"{name} within {error:.0f} % (expected {expected:.0f} %)")
     if found:
-        zero = ", but for what each run has of its own," if report["own_of_runs"] else ""
+        zero = ", but for zeros, places and moments of its runs," if report["own_of_runs"] else ""
         yield (
             f"Of each folder's readings{zero} the others foretell, of their size: {_listed(found)}."
         )
