@@ -275,8 +275,7 @@ def test_a_term_is_judged_where_the_fitted_runs_reached(within, verdict):
     said = [note for note in found.notes if "48 of 120 held-out readings" in note]
     assert len(said) == (verdict == "effect_discovered")
     # The error that is printed is of all of them.
-    best = found.holdout_best
-    assert best > 3.0 * 0.03
+    assert found.holdout_best > 3.0 * 0.03
 
 
 @pytest.mark.parametrize(

@@ -151,9 +151,14 @@ def scaled(effect: Effect, shares: Mapping[str, float]) -> Effect:
     return replace(effect, variants=variants)
 
 
+def name_of_run(shared: str, run: int) -> str:
+    """What a parameter is called that belongs to one run alone, counted from 0."""
+    return f"run{run + 1}_{shared}"
+
+
 def of_run(p: Parameter, run: int) -> Parameter:
     """A parameter as that of one run alone, counted from 0; it may have been another run's."""
-    return replace(p, name=f"run{run + 1}_{p.shared_name}", run=run)
+    return replace(p, name=name_of_run(p.shared_name, run), run=run)
 
 
 def of_specimen(p: Parameter, specimen: int) -> Parameter:

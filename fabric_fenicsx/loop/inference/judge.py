@@ -122,7 +122,7 @@ class Judge:
         where the fitted runs reached, unless that is less than is left out at a time otherwise.
         """
         out = self.held_rows
-        terms = [v for v, e in zip(model.fit.variants, model.effects, strict=True) if not e.listed]
+        terms = _terms_of(model)
         if not terms or not out.any():
             return out
         within = out & self.experiment.reached(terms, model.fit.values)
@@ -241,9 +241,8 @@ class Judge:
         """
         if self.experiment.terms or self.experiment.curves_only:
             return False
-        found = self.misfit(model)
-        more = self.given is not None and found.reading > CRITERIA.scatter * self.given
-        return more or found.whiteness.structured
+        more = self.given is not None and self.doubtful_noise(model)
+        return more or self.misfit(model).whiteness.structured
 
     def slow_noise(self, model: Model) -> bool:
         """Whether noise that was not stated is so slow that it looks like a misfit."""
@@ -367,8 +366,7 @@ class Judge:
 
     def _known_of(self, model: Model) -> list[str]:
         """Parameters of terms without a formula, which have to be known where they foretell."""
-        terms = [v for v, e in zip(model.fit.variants, model.effects, strict=True) if not e.listed]
-        return [p.name for v in terms for p in v.parameters]
+        return [p.name for v in _terms_of(model) for p in v.parameters]
 
     def settled(self, model: Model, baseline: Model) -> bool:
         """Whether a model leaves noise alone, or so little else that nothing can be made of it."""
@@ -495,3 +493,8 @@ class Judge:
             ratio = float(np.sqrt(f_ratio.isf(1e-3, independent, known)))
             return min(ratio, CRITERIA.significant)
         return float(np.sqrt(chi2.isf(1e-3, independent) / independent))
+
+
+def _terms_of(model: Model) -> list[Variant]:
+    """The forms of a model that are of terms without a formula."""
+    return [v for v, e in zip(model.fit.variants, model.effects, strict=True) if not e.listed]

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..expressions.marching import Marched, Varying
+from ..inference.effects import name_of_run
 from ..inference.experiment import Readings
 from .picture_frame.variant import FrameVariant
 from .recorded_rig import RecordedRig
@@ -70,9 +71,9 @@ def zeros_of(
     time = recorded.at_readings(recorded.points["time"].value)
     for run in runs:
         rows = readings.run == run
-        if f"run{run + 1}_{next(iter(names))}" in values:
+        if name_of_run(next(iter(names)), run) in values:
             for n, c in columns.items():
-                name, column = f"run{run + 1}_{n}", np.broadcast_to(c, shape)[:, run]
+                name, column = name_of_run(n, run), np.broadcast_to(c, shape)[:, run]
                 total[:, run] += values[name] * column
                 found[name] = np.zeros(shape)
                 found[name][:, run] = column
@@ -109,7 +110,7 @@ def numbers_of_runs(
         to_own_numbers.
     """
     shared = variant.amplitudes[0].shared_name
-    found = np.array([values.get(f"run{run + 1}_{shared}", 0.0) for run in range(runs)])
+    found = np.array([values.get(name_of_run(shared, run), 0.0) for run in range(runs)])
     slopes, others = {}, np.ones(runs)
     if variant.from_the_first:
         others[first] = 0.0
@@ -149,5 +150,5 @@ def to_own_numbers(found: Predicted, readings: Readings) -> tuple[Predicted, dic
         force[own] += along[own] @ change
         slopes = {name: without(slope, rows, J) for name, slope in slopes.items()}
         for name, more in zip(shared, change.tolist(), strict=True):
-            added[f"run{run + 1}_{name.removesuffix(OTHERS)}"] = more
+            added[name_of_run(name.removesuffix(OTHERS), run)] = more
     return (force, slopes), added

@@ -119,7 +119,7 @@ class RecordedRig:
 
     def each(self, numbers: Array) -> Varying:
         """A number of each run at its points."""
-        return Varying(np.broadcast_to(numbers, self.points["time"].value.shape))
+        return self.of_each(Varying(numbers))
 
     def of_each(self, x: Varying) -> Varying:
         """The same of what depends on parameters, (n_runs,)."""

@@ -1,8 +1,8 @@
 """What each run has of its own, as a form of a term and as an effect.
 
-The frame's place   [mm] that it was put back to before the run
-The load cell's gain     less what it is in the first run
-A moment            how much there is of it; see run_terms
+The frame's place       that it was put back to before the run [mm]
+The load cell's gain    less what it is in the first run
+A moment                how much there is of it; see run_terms
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ class FrameVariant(Variant):
     Attributes:
         laws: laws of a crossing (mechanics.laws) whose moments per area of fabric [N] add.
         by_run: factor of these, from the parameters and how many runs of its specimen were before;
-            with ``each_run`` it is the parameter of the run.
+            None where they go by none, or each run has its own (``each_run``).
         travel: true crosshead displacement [mm] from the parameters, the crosshead's place D [mm]
             and the true displacement at the reading before, None unless ``remembers_travel``.
         reading: what the load cell adds [N] at the time t [s].
