@@ -156,15 +156,15 @@ def test_only_strips_whose_holds_are_read_are_solved_standing_still():
 
 
 def test_a_stop_between_two_readings_was_when_the_way_was_gone():
-    time = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])[:, None]
-    D = np.array([0.0, 2.0, 4.0, 5.0, 5.0, 4.0])[:, None]
-    speed = np.array([2.0, 2.0, 2.0, 0.0, 0.0, -1.0])[:, None]
-    phases = phases_of(D, speed, backward(D, speed))
-    since = since_stop(D, time, speed, phases, np.array([5.0]))
+    time = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
+    D = np.array([0.0, 2.0, 4.0, 5.0, 5.0, 4.0])
+    speed = np.array([2.0, 2.0, 2.0, 0.0, 0.0, -1.0])
+    phases = phases_of(D, speed, backward(speed))
+    since = since_stop(D, time, speed, phases, 5.0)
     assert np.isnan(since[[0, 1, 2, 5]]).all()
-    assert since[3:5, 0] == pytest.approx([0.5, 1.5])
+    assert since[3:5] == pytest.approx([0.5, 1.5])
     # One that stopped before its end is not held where it got furthest.
-    assert np.isnan(since_stop(D, time, speed, phases, np.array([8.0]))).all()
+    assert np.isnan(since_stop(D, time, speed, phases, 8.0)).all()
 
 
 def test_a_dashpot_costs_its_work():
@@ -246,12 +246,11 @@ def test_a_hold_does_not_make_a_crosshead_slow():
 
 
 def test_what_is_pulled_once_is_not_solved_back(strip):
-    assert not strip._back.any() and strip.curve.back is None
+    assert not strip._goes_back.any() and strip.curve.back is None
     assert all(path.back is None for path in strip._strips.paths.values())
     # At rest a crosshead is on the way that it came.
-    D = np.array([0.0, 1.0, 1.0, 0.5, 0.5, 1.0])[:, None]
-    speed = np.array([1.0, 1.0, 0.0, -1.0, 0.0, 1.0])[:, None]
-    assert backward(D, speed)[:, 0].tolist() == [False, False, False, True, True, False]
+    speed = np.array([1.0, 1.0, 0.0, -1.0, 0.0, 1.0])
+    assert backward(speed).tolist() == [False, False, False, True, True, False]
 
 
 @pytest.mark.parametrize(

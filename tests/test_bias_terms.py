@@ -141,7 +141,7 @@ def test_angles_that_were_read_seldom_are_those_read_each_time(name, label):
     for between, step in ((2, 1), (1, 2)):
         measurement = of_runs(run_of(force=FORCE, back=True))
         test = BiasExtension([with_angles(measurement, every=between)])
-        assert test._going_runs.tolist() == [0]
+        assert test._going.runs.tolist() == [0]
         variant = term(test, name, label)
         values = VALUES | dict.fromkeys((p.name for p in variant.parameters), 0.02)
         expected, slopes = test.predict((variant,), values)

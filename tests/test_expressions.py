@@ -152,15 +152,19 @@ def test_what_was_before_the_first_point_is_not_kept_for_another():
         assert y[:, 0] == pytest.approx(expected, rel=1e-14)
 
 
-def test_nothing_is_remembered_behind_the_end_of_a_record():
-    """Records of which some are shorter: up to its end each is as if all had all points."""
-    x = Varying(np.random.default_rng(2).normal(size=(9, 3)), {"r": np.ones((9, 3))})
-    values, count = {"p": 2.0, "q": 0.3}, np.array([9, 4, 6])
-    whole = a_law_with_memory()({"x": x}, values)["y"]
-    short = a_law_with_memory()({"x": x}, values, count=count)["y"]
-    for record, end in enumerate(count):
-        rows = np.s_[:end, record]
-        assert np.array_equal(short.value[rows], whole.value[rows])
+@pytest.mark.parametrize("columns", [(), (1,), (3,)])
+def test_nothing_is_remembered_of_the_record_before(columns):
+    """Records one after the other: each is as by itself, with what it remembers at first."""
+    x = Varying(np.random.default_rng(2).normal(size=(9, *columns)), {"r": np.ones((9, *columns))})
+    values, begins, first = {"p": 2.0, "q": 0.3}, np.array([0, 4, 5]), np.array([0.1, 0.9, 2.0])
+    one_by_one = a_law_with_memory()({"x": x}, values, {"largest": first}, begins)["y"]
+    assert one_by_one.value.shape == (9, *columns)
+    for start, end, largest in zip(begins, (4, 5, 9), first, strict=True):
+        own = Varying(x.value[start:end], {"r": x.slopes["r"][start:end]})
+        alone = a_law_with_memory()({"x": own}, values, {"largest": np.array([largest])})["y"]
+        assert np.array_equal(one_by_one.value[start:end], alone.value)
         for name in "pqr":
-            assert np.array_equal(short.slopes[name][rows], whole.slopes[name][rows])
-    assert not short.value[4:, 1].any() and whole.value[4:, 1].all()
+            among = np.broadcast_to(one_by_one.slopes[name], one_by_one.value.shape)
+            by_itself = np.broadcast_to(alone.slopes[name], alone.value.shape)
+            assert np.array_equal(among[start:end], by_itself)
+    assert one_by_one.value[4].min() > 1.0

@@ -1,5 +1,7 @@
 """What a crosshead's record tells of its motion."""
 
+import shutil
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -72,8 +74,12 @@ def frame(folder, per_second):
 
 
 @pytest.fixture(scope="module")
-def frames(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("frames")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("frames")
+
+
+@pytest.fixture(scope="module")
+def frames(folder):
     return frame(folder / "seldom", 4), frame(folder / "often", 32)
 
 
@@ -112,3 +118,29 @@ def own_readings(test):
     for run in np.unique(test.readings.run):
         rows = np.flatnonzero(test.readings.run == run)
         yield rows[0], 1 + (len(rows) - 1) // 8
+
+
+def test_a_run_is_foretold_the_same_whatever_runs_are_beside_it(folder, frames, tmp_path):
+    """Also by terms over what changes from one reading to the next, up to the last one."""
+    together = frames[0]
+    values = {"k1_N": 0.3, "k3_N": 1.0, "c1_N_s": 0.3}
+    forms = [
+        v
+        for e in (*together.effects, *together.terms)
+        for v in e.variants[:1]
+        if "run" not in e.name and not v.each_run
+    ]
+    own = tmp_path / "alone"
+    shutil.copytree(folder / "seldom", own)
+    for run, name in enumerate(("out", "to_and_fro", "ramps")):
+        (own / "measurement.yaml").write_text(HEAD + f"  - {{file: {name}.csv, role: fit}}\n")
+        alone = PictureFrame([read_measurement(own)])
+        rows = together.readings.run == run
+        for form in forms:
+            first = {p.name: 0.1 if p.amplitude else p.starts[0] for p in form.parameters}
+            among, by_itself = (test.predict((form,), values | first) for test in (together, alone))
+            assert by_itself[0] == pytest.approx(among[0][rows], rel=1e-9, abs=1e-9), form.label
+            for p in form.parameters:
+                size = np.abs(among[1][p.name]).max() or 1.0
+                assert np.abs(by_itself[1][p.name] - among[1][p.name][rows]).max() < 1e-9 * size
+    assert len(forms) > 30

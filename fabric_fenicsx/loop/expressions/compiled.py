@@ -63,16 +63,16 @@ WRITTEN: dict[str, str] = {
 FRAME = """#include <math.h>
 /* Inputs x, parameters p, memory h; M of them with partial derivatives P in x, h and p. Of the
    inputs those in moving have slopes dx. */
-void march(long points, long records, long active, long moved, const double *x, const double *dx,
-           const double *p, const long *moving, const long *slot, const long *count,
+void march(long points, long columns, long active, long moved, const double *x, const double *dx,
+           const double *p, const long *moving, const long *slot, const char *begins,
            double *h, double *dh)
 {{
   enum {{ X = {inputs}, M = {memory}, N = {parameters} }};
-  const long size = points * records;
-  for (long i = 0; i + 1 < points; ++i)
-    for (long r = 0; r < records; ++r) {{
-      if (i + 1 >= count[r]) continue;
-      const long at = i * records + r, next = at + records;
+  const long size = points * columns;
+  for (long i = 0; i + 1 < points; ++i) {{
+    if (begins[i + 1]) continue;
+    for (long c = 0; c < columns; ++c) {{
+      const long at = i * columns + c, next = at + columns;
       double now[M], P[M][X + M + N];
 {body}
       for (int m = 0; m < M; ++m) {{
@@ -88,6 +88,7 @@ void march(long points, long records, long active, long moved, const double *x, 
           dh[(m * active + slot[s]) * size + next] += P[m][X + M + s];
       }}
     }}
+  }}
 }}
 """
 
@@ -109,11 +110,11 @@ def march(
         parameters: of the numbers.
 
     Returns:
-        A function of the inputs (n_inputs, n_points, n_records), the slopes of those that have any
-        (n_moving, n_active, n_points, n_records), the numbers of these, the parameters' values,
-        their places among the active ones, the memory before the first point (n_memory, n_records),
-        and how many points each record has, (n_records,). It gives memory and its slopes before
-        each point, shaped likewise; nothing behind the last one.
+        A function of the inputs (n_inputs, n_points, n_columns), the slopes of those that have any
+        (n_moving, n_active, n_points, n_columns), the numbers of these, the parameters' values,
+        their places among the active ones, the numbers of the points that records begin with,
+        (n_records,), and the memory there, (n_memory, n_records). It gives memory and its slopes
+        before each point, shaped likewise.
     """
     places = (
         {name: f"x[{k} * size + at]" for k, name in enumerate(inputs)}
@@ -149,19 +150,21 @@ def march(
         moving: npt.NDArray[Any],
         values: Array,
         slot: npt.NDArray[Any],
+        begins: npt.NDArray[Any],
         first: Array,
-        count: npt.NDArray[Any],
     ) -> tuple[Array, Array]:
-        points, records = x.shape[1:]
+        points, columns = x.shape[1:]
         active = dx.shape[1]
-        h = np.zeros((n_memory, points, records))
-        h[:, 0] = first
-        dh = np.zeros((n_memory, active, points, records))
+        h = np.zeros((n_memory, points, columns))
+        h[:, begins] = first[:, :, None]
+        dh = np.zeros((n_memory, active, points, columns))
+        flags = np.zeros(points, dtype=np.int8)
+        flags[begins] = 1
         real = [np.ascontiguousarray(a, dtype=float) for a in (x, dx, values)]
-        whole = [np.ascontiguousarray(a, dtype=ctypes.c_long) for a in (moving, slot, count)]
+        whole = [np.ascontiguousarray(a, dtype=ctypes.c_long) for a in (moving, slot)]
         function(
-            *(ctypes.c_long(number) for number in (points, records, active, len(moving))),
-            *(ctypes.c_void_p(a.ctypes.data) for a in (*real, *whole, h, dh)),
+            *(ctypes.c_long(number) for number in (points, columns, active, len(moving))),
+            *(ctypes.c_void_p(a.ctypes.data) for a in (*real, *whole, flags, h, dh)),
         )
         return h, dh
 

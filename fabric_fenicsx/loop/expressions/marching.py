@@ -4,7 +4,8 @@
     dy_i/dp = ∂f/∂p + ∂f/∂x dx_i/dp + ∂f/∂h dh_i/dp,    and dh/dp is marched along with h
 
 f and g are UFL, taken apart into single operations, which the chain rule differentiates. Records
-stand side by side, (n_points, n_records), and are marched together.
+stand one after the other, (n_points,), or so in columns, (n_points, n_columns), and are marched
+together.
 """
 
 from __future__ import annotations
@@ -25,14 +26,17 @@ from .compiled import march
 __all__ = ["MOST_KEPT", "Marched", "Varying", "spread"]
 
 Array = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.int64]
 
 MOST_KEPT = 64
 """Of so many expressions is kept what does not change: of all, memory would grow."""
+ONE_RECORD: Numbers = np.zeros(1, dtype=np.int64)
+"""Where a single record begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Varying:
-    """Values over the records, (n_points, n_records), and their derivatives by parameter."""
+    """Values over the records, (n_points,) or in columns, and their derivatives by parameter."""
 
     value: Array
     slopes: dict[str, Array] = field(default_factory=dict)
@@ -90,17 +94,16 @@ class Marched:
         inputs: Mapping[str, Varying],
         values: Mapping[str, float | Array],
         first: Mapping[str, Array] = MappingProxyType({}),
-        count: Array | None = None,
+        begins: Numbers = ONE_RECORD,
     ) -> dict[str, Varying]:
         """Evaluate over whole records.
 
         Args:
             inputs: by their names.
-            values: of the parameters; without memory also those of each record, which broadcast.
+            values: of the parameters; without memory also those of each point, which broadcast.
             first: what is remembered before the first point of each record, (n_records,), by name
                 as in ``remembered``; of others nothing.
-            count: points of each record behind which nothing is remembered, as nothing is asked
-                for, (n_records,), always the same for the same expressions; by default all of them.
+            begins: numbers of the points that records begin with, (n_records,).
         """
         known = {name: inputs[name] for name in self.inputs}
         numbers: dict[str, Any] = {name: values[name] for name in self.parameters}
@@ -110,11 +113,11 @@ class Marched:
                 name: first.get(name.removeprefix("remembered "), 0.0) for name in self._memory
             }
             if self._own or any(varying.slopes for varying in known.values()):
-                known |= self._march(known, numbers, shape, begin, count)
+                known |= self._march(known, numbers, shape, begin, begins)
             else:
-                given = [*(varying.value for varying in known.values()), *begin.values()]
+                given = [*(varying.value for varying in known.values()), *begin.values(), begins]
                 known |= _kept(
-                    self, given, lambda: self._march(known, numbers, shape, begin, count)
+                    self, given, lambda: self._march(known, numbers, shape, begin, begins)
                 )
         at = {name: varying.value for name, varying in known.items()} | numbers
         results = self._differentiated(known)(at)
@@ -137,7 +140,7 @@ class Marched:
         numbers: dict[str, float],
         shape: tuple[int, ...],
         first: Mapping[str, Any],
-        count: Array | None,
+        begins: Numbers,
     ) -> dict[str, Varying]:
         """What is remembered before each point."""
         active = sorted({*self._own, *(p for v in known.values() for p in v.slopes)})
@@ -153,11 +156,13 @@ class Marched:
         if self._loop is None:
             memory, own = tuple(self._memory), tuple(self._own)
             self._loop = march(self._history, self._partials, self.inputs, memory, own)
-        h0 = np.zeros((len(self._memory), shape[1]))
+        h0 = np.zeros((len(self._memory), len(begins)))
         for k, name in enumerate(self._memory):
             h0[k] = first[name]
-        last = np.full(shape[1], shape[0]) if count is None else count
-        h, dh = self._loop(x, dx, moving, values, slot, h0, last)
+        columns = (shape[0], int(np.prod(shape[1:])))
+        x, dx = x.reshape(len(x), *columns), dx.reshape(*dx.shape[:2], *columns)
+        h, dh = self._loop(x, dx, moving, values, slot, begins, h0)
+        h, dh = h.reshape(len(h), *shape), dh.reshape(len(h), len(active), *shape)
         return {
             name: Varying(h[k], dict(zip(active, dh[k], strict=True)))
             for k, name in enumerate(self._memory)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from math import inf
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -31,7 +31,7 @@ from .own_of_runs import OTHERS, Predicted, numbers_of_runs, to_own_numbers, wit
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
 from .recorded_rig import RecordedRig
-from .records import runs_before, typical
+from .records import Records, runs_before, typical
 from .slipping import Slips
 
 __all__ = ["CrossheadTest"]
@@ -78,14 +78,14 @@ class CrossheadTest:
         self._compiled: dict[Any, Marched] = {} if like is None else like._compiled
         #: Angles and rates of a rig that follows the crosshead.
         self._still: dict[str, Varying] | None = None
-        self._slips = Slips()
         self._recorded = RecordedRig(motions, self._compiled)
+        self._slips = Slips(self._recorded.records)
         self._points = self._recorded.points
         self._moments = CrossingMoments(
             self._compiled,
             self._from_earlier_runs,
             lambda: self._recorded.each(self._before["specimen"]),
-            self._numbers_of_runs,
+            lambda v, values: self._recorded.of_each(self._numbers_of_runs(v, values)),
         )
         self._set_up(runs)
         known = self._kinematics(self._points, {})
@@ -134,9 +134,9 @@ class CrossheadTest:
         return readings
 
     @property
-    def _on_the_load_cell(self) -> Array | float:
+    def _on_the_load_cell(self) -> Array:
         """One for runs that a load cell reads, else zero, (n_runs,)."""
-        return 1.0
+        return np.ones(len(self._recorded.records.begins))
 
     def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
         """An effect in the unit of the data."""
@@ -150,7 +150,7 @@ class CrossheadTest:
         """γ at each point and at the one before, γ̇, 1/Δt, and what the moments are weighed by.
 
         By name: gamma, gamma_n, rate, per_time, ``rate_per_speed`` dγ/dD and ``factor`` A dγ/dD
-        [mm² rad/mm], (n_points, n_crossings) each.
+        [mm² rad/mm], (n_points,) or (n_points, n_crossings) each.
         """
         raise NotImplementedError
 
@@ -159,17 +159,17 @@ class CrossheadTest:
         return force
 
     def _gathered(self, values: Array) -> Array:
-        """Sums over the crossings of each run, (n_points, n_runs)."""
+        """Sums over the crossings of each run, (n_points,)."""
         return values
 
     def _shown(self, values: Array) -> Array:
         """Of the crossings of a run the one that is shown, at every reading, (n,)."""
         return self._recorded.at_readings(values)
 
-    @cached_property
-    def _counts(self) -> Array:
-        """Points of each record of a crossing that are asked for, (n_crossings,)."""
-        return self._recorded.counts
+    @property
+    def _of_crossings(self) -> Records:
+        """Where the records of crossings stand."""
+        return self._recorded.records
 
     # Data ---------------------------------------------------------------------------------
 
@@ -248,7 +248,8 @@ class CrossheadTest:
             else:
                 found = self._recorded.added(variant, "variable", whole, values)
             return self._recorded.at_readings(found.value)
-        variable = self._moments.variable(variant, self._kinematics(self._points, {}), values)
+        known = self._kinematics(self._points, {})
+        variable = self._moments.variable(variant, known, values, self._of_crossings.begins)
         return self._shown(variable.value)
 
     def reached(self, terms: Sequence[Variant], values: Mapping[str, float]) -> Flags:
@@ -275,22 +276,23 @@ class CrossheadTest:
             return float(np.abs(values[rows]).max())
 
         D, speed, time = (self._points[name].value for name in ("D", "D_rate", "time"))
-        moved = np.diff(D, axis=0, prepend=D[:1])
-        change = np.diff(self._kinematics(self._points, {})["gamma"].value, axis=0, prepend=0.0)
-        change[0] = 0.0
+        records, crossings = self._recorded.records, self._of_crossings
+        way = records.so_far(np.abs(records.changes(D)))
+        sheared = np.abs(crossings.changes(self._kinematics(self._points, {})["gamma"].value))
+        duration = (time[records.ends] - time[records.begins]).tolist()
         force = float(np.abs(self._fitted_forces).max())
         acceleration = self._recorded.acceleration.value
         return {
             "angle": most(self._gamma),
             "rate": most(self._rate),
-            "path": most(self._shown(np.cumsum(np.abs(change), axis=0))),
-            "time": most(self._recorded.at_readings(time - time[0])),
+            "path": most(self._shown(crossings.so_far(sheared))),
+            "time": most(self._recorded.at_readings(self._recorded.since_start.value)),
             "displacement": most(self._recorded.at_readings(D)),
-            "way": most(self._recorded.at_readings(np.cumsum(np.abs(moved), axis=0))),
+            "way": most(self._recorded.at_readings(way)),
             "speed": most(self._recorded.at_readings(speed)),
             "acceleration": most(self._recorded.at_readings(acceleration)),
             "force": force,
-            "force_rate": force / max(float(np.median(time[-1])), 1e-9),
+            "force_rate": force / max(float(np.median(duration)), 1e-9),
         }
 
     @property
@@ -364,7 +366,8 @@ class CrossheadTest:
             travel = self._moved(v, travel, mine, values)
         whole = self._force(travel, mine, values)
         zeros: list[tuple[Flags, Array]] = []
-        cell = Varying(np.asarray(self._on_the_load_cell))
+        on_the_cell = self._on_the_load_cell
+        cell = self._recorded.each(on_the_cell)
         read = whole
         for v in mine:
             if v.added_reading is not None:
@@ -374,8 +377,7 @@ class CrossheadTest:
                 read += cell * self._acting(whole) * gain
             if v.each_run == "zero":
                 left = self.readings.observed - self._recorded.at_readings(read.value)
-                of_cell = np.broadcast_to(self._on_the_load_cell, read.value.shape[1:])
-                runs = np.flatnonzero(of_cell)
+                runs = np.flatnonzero(on_the_cell)
                 added, own_zeros = zeros_of(
                     self._recorded, v, values, left, self.readings, runs, self._compiled
                 )
@@ -386,7 +388,7 @@ class CrossheadTest:
         force, slopes = read.value, read.slopes
         names = [p.name for p in (*self.baseline, *(p for v in mine for p in v.parameters))]
         names += [name for name in slopes if name.endswith(OTHERS)]
-        zero = np.zeros(len(self._recorded.place[0]))
+        zero = np.zeros(len(self._recorded.readings))
         found = {
             name: self._recorded.at_readings(slopes[name]) if name in slopes else zero
             for name in names
@@ -444,7 +446,7 @@ class CrossheadTest:
         values: Mapping[str, float],
         by: Collection[str] | None = None,
     ) -> Varying:
-        """Force [N] that the moments of the crossings make, (n_points, n_runs).
+        """Force [N] that the moments of the crossings make, (n_points,).
 
         Args:
             travel: at all points.
@@ -454,10 +456,11 @@ class CrossheadTest:
         """
         known = self._kinematics(travel, values)
         again = known is self._still
-        moment = self._moments.of(None, known, values, self._counts, again=again)
+        begins = self._of_crossings.begins
+        moment = self._moments.of(None, known, values, begins, again=again)
         for v in variants:
             if v.laws is not None:
-                moment += self._moments.of(v, known, values, self._counts, again=again)
+                moment += self._moments.of(v, known, values, begins, again=again)
         factor = known["factor"]
         if by is not None:
             moment, factor = (
@@ -472,7 +475,7 @@ class CrossheadTest:
 
     def _numbers_of_runs(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
         """What each run has of its own, (n_runs,); see numbers_of_runs."""
-        runs = self._points["D"].value.shape[1]
+        runs = len(self._recorded.records.begins)
         fitted = self.readings.run[self.readings.fit]
         return numbers_of_runs(variant, values, runs, int(fitted.min()))
 

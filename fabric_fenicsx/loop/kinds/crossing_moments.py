@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ...inputs.parameters import Parameter
 from ...mechanics.laws.dashpots import LinearDashpot
 from ...mechanics.laws.springs import PolynomialSpring
-from ..expressions.marching import MOST_KEPT, Marched, Varying
+from ..expressions.marching import MOST_KEPT, ONE_RECORD, Marched, Varying
 from ..kept import Kept
 from .picture_frame.variant import FrameVariant
 from .records import of_a_crossing
@@ -23,6 +23,7 @@ from .records import of_a_crossing
 __all__ = ["BASELINE", "CrossingMoments"]
 
 Array = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.int64]
 
 BASELINE = (
     Parameter("k1_N", (0.0,), 0.0, meaning="spring, moment per area and angle"),
@@ -58,7 +59,7 @@ class CrossingMoments:
         variant: FrameVariant | None,
         known: dict[str, Varying],
         values: Mapping[str, float],
-        count: Array | None = None,
+        begins: Numbers = ONE_RECORD,
         *,
         again: bool = False,
     ) -> Varying:
@@ -68,13 +69,13 @@ class CrossingMoments:
             variant: the effect's form; None: the baseline's.
             known: what the laws go by at each point of each record.
             values: of the parameters.
-            count: points of each record that are asked for; by default all.
+            begins: numbers of the points that records begin with, (n_records,).
             again: whether the same arrays will be known again, beside each of many effects.
         """
 
         def made() -> Varying:
             first = {} if variant is None else self._first(variant)
-            moment = self._law(variant)(known, values, first, count)["moment"]
+            moment = self._law(variant)(known, values, first, begins)["moment"]
             if variant is not None and variant.each_run == "moment":
                 return moment * self._own(variant, values)
             if variant is None or variant.by_run is None:
@@ -90,9 +91,13 @@ class CrossingMoments:
         return self._kept(variant, (known, numbers), made)
 
     def variable(
-        self, variant: FrameVariant, known: dict[str, Varying], values: Mapping[str, float]
+        self,
+        variant: FrameVariant,
+        known: dict[str, Varying],
+        values: Mapping[str, float],
+        begins: Numbers,
     ) -> Varying:
-        """What the law of a term without a formula depends on."""
+        """What the law of a term without a formula depends on; see ``of``."""
         assert variant.laws is not None
         key = (variant.like or variant, "along")
         if key not in self._compiled:
@@ -102,7 +107,7 @@ class CrossingMoments:
             crossing = of_a_crossing(marched, 0)
             history = {f"0 {n}": value for n, value in law.history(crossing).items()}
             self._compiled[key] = marched.define({"variable": law.variable_at(crossing)}, history)
-        return self._compiled[key](known, values, self._first(variant))["variable"]
+        return self._compiled[key](known, values, self._first(variant), begins)["variable"]
 
     def _law(self, variant: FrameVariant | None) -> Marched:
         """The sum of a form's laws, or of the baseline's, with what they remember."""

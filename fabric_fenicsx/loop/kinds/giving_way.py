@@ -28,7 +28,7 @@ import numpy.typing as npt
 from scipy.linalg import solve_banded
 
 from ..expressions.marching import Varying
-from .records import one_point_before, shifted
+from .records import Records
 
 __all__ = ["BY_TRAVEL", "Added", "in_series"]
 
@@ -81,7 +81,7 @@ Ask = Callable[[Array, Varying], _Asked]
 """G at an x and a rate."""
 
 
-def in_series(added: Added, travel: Any, rounds: int) -> tuple[Varying, Varying]:
+def in_series(added: Added, travel: Any, rounds: int, records: Records) -> tuple[Varying, Varying]:
     """What is added to a travel [mm] by the force that it leaves, and how fast that changes.
 
     Newton's steps for x are of all points together: a matrix with one diagonal beside its own. What
@@ -91,6 +91,7 @@ def in_series(added: Added, travel: Any, rounds: int) -> tuple[Varying, Varying]
         added: g.
         travel: at all points, with "per_time".
         rounds: most steps, for y and for x.
+        records: where the runs stand.
     """
     V, per_time = travel["D_rate"], travel["per_time"].value
     ask, least = _asking(added, travel), LAST * float(np.abs(travel["D"].value).max())
@@ -104,23 +105,23 @@ def in_series(added: Added, travel: Any, rounds: int) -> tuple[Varying, Varying]
         at = ask(y, V)
     settled = Varying(y, {p: slope / at.free for p, slope in at.slopes.items()})
     kappa = _kappa(ask, at, settled, travel)
-    corners = Varying(_turned(V.value) * per_time)
-    s = _change(settled) * Varying(per_time) + kappa * corners
+    corners = Varying(_turned(V.value, records) * per_time)
+    s = _change(settled, records) * Varying(per_time) + kappa * corners
     weight = _weight(kappa, per_time)
     # ẋ, as far as it does not hang on x.
     rest = s + s * weight * Varying(-1.0 / per_time)
-    begins = np.zeros((len(y), 1))
-    begins[0] = 1.0
-    x = y * (1.0 - begins)
+    goes_on = np.ones(len(y))
+    goes_on[records.begins] = 0.0
+    x = y * goes_on
     for _ in range(rounds):
-        at = ask(x, V + rest + weight * _change(Varying(x)))
-        matrix = at.free - at.by_rate * weight.value, at.by_rate * weight.value
-        step, *slopes = _solved(matrix, [(1.0 - begins) * r for r in (at.off, *at.slopes.values())])
+        at = ask(x, V + rest + weight * _change(Varying(x), records))
+        matrix = at.free - at.by_rate * weight.value, at.by_rate * weight.value * goes_on
+        step, *slopes = _solved(matrix, [goes_on * r for r in (at.off, *at.slopes.values())])
         x = x + step
         if np.abs(step).max() < least:
             break
     found = Varying(x, dict(zip(at.slopes, slopes, strict=True)))
-    return found, rest + weight * _change(found)
+    return found, rest + weight * _change(found, records)
 
 
 def _asking(added: Added, travel: Any) -> Ask:
@@ -172,23 +173,21 @@ def _weight(kappa: Varying, per_time: Array) -> Varying:
     return Varying(weight, {p: by_kappa * slope for p, slope in kappa.slopes.items()})
 
 
-def _change(of: Varying) -> Varying:
+def _change(of: Varying, records: Records) -> Varying:
     """From the point before, along each record; 0 at the first."""
-    return of + one_point_before(of) * Varying(-np.ones(()))
+    changes = {p: records.changes(slope) for p, slope in of.slopes.items()}
+    return Varying(records.changes(of.value), changes)
 
 
-def _turned(speed: Array) -> Array:
+def _turned(speed: Array, records: Records) -> Array:
     """Changes of crossheads' speeds [mm/s] since the point before where these are corners."""
-    change, size = speed - shifted(speed), np.abs(speed)
-    both = np.maximum(size, shifted(size))
+    change, size = records.changes(speed), np.abs(speed)
+    both = np.maximum(size, size[records.before])
     return np.where(np.abs(change) > CORNER * both, change, 0.0)
 
 
 def _solved(matrix: tuple[Array, Array], right: Sequence[Array]) -> list[Array]:
-    """Solutions of a system with a diagonal, and one of the points before, of each record."""
+    """Solutions of a system with a diagonal, and one of the points before."""
     own, before = matrix
-    before = np.concatenate([np.zeros_like(before[:1]), before[1:]])
-    banded = np.stack([own.T.ravel(), np.append(before.T.ravel()[1:], 0.0)])
-    every = np.column_stack([r.T.ravel() for r in right])
-    found = solve_banded((1, 0), banded, every, check_finite=False)
-    return [one.reshape(own.T.shape).T for one in found.T]
+    banded = np.stack([own, np.append(before[1:], 0.0)])
+    return list(solve_banded((1, 0), banded, np.column_stack(right), check_finite=False).T)

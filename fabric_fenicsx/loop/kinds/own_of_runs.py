@@ -53,7 +53,7 @@ def zeros_of(
         compiled: where expressions are kept.
 
     Returns:
-        What it adds [N], (n_points, n_runs); of runs that are not fitted their readings, flags, and
+        What it adds [N], (n_points,); of runs that are not fitted their readings, flags, and
         the columns that were fitted to them; see without.
     """
     zeros = []
@@ -66,24 +66,25 @@ def zeros_of(
         force = variant.reading(unit.at, unit.at["time"])
         compiled[key] = unit.define({"force": force}, {})
     columns = compiled[key](recorded.points, dict.fromkeys(names, 0.0))["force"].slopes
-    shape = recorded.points["time"].value.shape
+    at_points = recorded.points["time"].value
+    shape = at_points.shape
     total, found = np.zeros(shape), {}
-    time = recorded.at_readings(recorded.points["time"].value)
+    time = recorded.at_readings(at_points)
     for run in runs:
-        rows = readings.run == run
+        rows, mine = readings.run == run, recorded.records.of(run)
         if name_of_run(next(iter(names)), run) in values:
             for n, c in columns.items():
-                name, column = name_of_run(n, run), np.broadcast_to(c, shape)[:, run]
-                total[:, run] += values[name] * column
+                name, column = name_of_run(n, run), np.broadcast_to(c, shape)[mine]
+                total[mine] += values[name] * column
                 found[name] = np.zeros(shape)
-                found[name][:, run] = column
+                found[name][mine] = column
         else:
             rows = rows & readings.usable
             line = np.column_stack([np.ones_like(time), time])
             J = line[rows]
             zero = np.linalg.lstsq(J, left[rows], rcond=None)[0]
             zeros.append((rows, J))
-            total[:, run] = zero[0] + zero[1] * recorded.points["time"].value[:, run]
+            total[mine] = zero[0] + zero[1] * at_points[mine]
     return Varying(total, found), zeros
 
 

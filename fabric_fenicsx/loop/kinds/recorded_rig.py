@@ -14,7 +14,7 @@ from ..expressions.marching import Marched, Varying, spread
 from .picture_frame.motion import Motion
 from .picture_frame.rig_variables import PER_SECOND
 from .picture_frame.variant import FrameVariant
-from .records import laid_out, one_point_before
+from .records import laid_out
 
 __all__ = ["RecordedRig"]
 
@@ -27,36 +27,29 @@ FEWEST, END = 3, 5
 
 
 class RecordedRig:
-    """What a rig did, point by point of its records side by side; see records.laid_out.
+    """What a rig did, point by point of its records; see records.laid_out.
 
     Args:
         motions: of the runs.
         compiled: where expressions are kept.
 
     Attributes:
-        points: by name, (n_points, n_runs) each.
-        place: point and run of every reading, (n,) each.
+        points: by name, (n_points,) each.
+        records: where the runs stand.
+        readings: point of every reading, (n,).
         before: how many runs of its folder were before each, (n_runs,).
         given: what else a rig knows at its points, by the names of FrameVariant.of.
     """
 
     def __init__(self, motions: Sequence[Motion], compiled: dict[Any, Marched]) -> None:
-        self.points, self.place = laid_out(motions)
+        self.points, self.records, self.readings = laid_out(motions)
         self._compiled = compiled
         self.before = np.zeros(len(motions))
         self.given: dict[str, Varying] = {}
 
-    @cached_property
-    def counts(self) -> Array:
-        """Points of each record, and the next one, which differences need, (n_runs,)."""
-        points, run = self.place
-        last = np.zeros(self.points["D"].value.shape[1], dtype=int)
-        np.maximum.at(last, run, points)
-        return np.minimum(last + 2, len(self.points["D"].value))
-
     def at_readings(self, values: Array) -> Array:
         """Of values at the points those at every reading, (n,)."""
-        return spread(values, self.points["D"].value.shape)[self.place]
+        return spread(values, self.records.run.shape)[self.readings]
 
     def travel(self, variant: FrameVariant | None, values: Mapping[str, float]) -> Any:
         """True displacement of the frame, and its rate."""
@@ -70,7 +63,7 @@ class RecordedRig:
             rate = derivative_of(true, marched.at["D"]) * marched.at["D_rate"]
             history = {"D": true} if variant.remembers_travel else {}
             self._compiled[key] = marched.define({"D": true, "D_rate": rate}, history)
-        return self._compiled[key](self.points, values)
+        return self._compiled[key](self.points, values, begins=self.records.begins)
 
     def added(
         self, variant: FrameVariant, wanted: str, force: Varying, values: Mapping[str, float]
@@ -99,19 +92,20 @@ class RecordedRig:
                 value = of(marched.at, at)
             self._compiled[key] = marched.define({wanted: value}, history)
         marched, known = self._compiled[key], self.known(force)
-        return marched({name: known[name]() for name in marched.inputs}, values)[wanted]
+        inputs = {name: known[name]() for name in marched.inputs}
+        return marched(inputs, values, begins=self.records.begins)[wanted]
 
     def known(self, force: Varying) -> dict[str, Callable[[], Varying]]:
         """What is known at a reading, by the names of FrameVariant.of, where it is wanted."""
         return {
-            "time": lambda: self._since_start,
+            "time": lambda: self.since_start,
             "displacement": lambda: self.points["D"],
             "speed": lambda: self.points["D_rate"],
             "acceleration": lambda: self.acceleration,
             "force": lambda: force,
             "force_rate": lambda: self.per_second(force),
-            "displacement_before": lambda: one_point_before(self.points["D"]),
-            "force_before": lambda: one_point_before(force),
+            "displacement_before": lambda: self.records.one_point_before(self.points["D"]),
+            "force_before": lambda: self.records.one_point_before(force),
             "per_time": lambda: self.points["per_time"],
             "run": lambda: self.each(self.before),
             **{name: partial(self.given.__getitem__, name) for name in self.given},
@@ -123,16 +117,14 @@ class RecordedRig:
 
     def of_each(self, x: Varying) -> Varying:
         """The same of what depends on parameters, (n_runs,)."""
-        shape = self.points["time"].value.shape
-        return Varying(
-            np.broadcast_to(x.value, shape), {p: spread(s, shape) for p, s in x.slopes.items()}
-        )
+        run = self.records.run
+        return Varying(x.value[run], {p: slope[run] for p, slope in x.slopes.items()})
 
     @cached_property
-    def _since_start(self) -> Varying:
+    def since_start(self) -> Varying:
         """Time in each run [s]."""
         time = self.points["time"].value
-        return Varying(time - time[0])
+        return Varying(time - time[self.records.begins][self.records.run])
 
     @cached_property
     def acceleration(self) -> Varying:
@@ -141,46 +133,42 @@ class RecordedRig:
         At both ends, where a run may have its largest acceleration, of the cubic that is nearest to
         the readings there. Between readings nobody knows how sharp a corner is.
         """
-        place, run = self.place
+        readings, run = self.readings, self.records.run
         time, D = (self.points[name].value for name in ("time", "D"))
         found = np.zeros(D.shape)
-        for k in range(D.shape[1]):
+        for k in range(len(self.records.begins)):
             # Where a record stands still at first, readings may share a point.
-            own = np.unique(place[run == k])
-            t = time[own, k]
+            own, whole = np.unique(readings[run[readings] == k]), self.records.of(k)
+            t = time[own]
             if len(own) > FEWEST:
-                bent = np.gradient(np.gradient(D[own, k], t), t)
-                bent[:2] = _bent_at_end(t[:END], D[own[:END], k])
-                bent[:-3:-1] = _bent_at_end(t[: -END - 1 : -1], D[own[: -END - 1 : -1], k])
-                found[:, k] = np.interp(time[:, k], t, bent)
+                bent = np.gradient(np.gradient(D[own], t), t)
+                bent[:2] = _bent_at_end(t[:END], D[own[:END]])
+                bent[:-3:-1] = _bent_at_end(t[: -END - 1 : -1], D[own[: -END - 1 : -1]])
+                found[whole] = np.interp(time[whole], t, bent)
         return Varying(found)
 
     def per_second(self, x: Varying) -> Varying:
         """How fast something changes along each record: differences of second order within it."""
-        step, weights = self._differences
+        of_before, own, of_after = self._differences
+        before, after = self.records.before, self.records.after
 
         def rate(values: Array) -> Array:
-            values = np.broadcast_to(values, (len(step) + 1, step.shape[1]))
-            found = np.empty(values.shape)
-            places = values[:-2], values[1:-1], values[2:]
-            found[1:-1] = sum(w * v for w, v in zip(weights, places, strict=True))
-            found[0] = (values[1] - values[0]) / step[0]
-            found[-1] = (values[-1] - values[-2]) / step[-1]
-            return found
+            values = spread(values, own.shape)
+            return np.asarray(of_before * values[before] + own * values + of_after * values[after])
 
         return Varying(rate(x.value), {p: rate(slope) for p, slope in x.slopes.items()})
 
     @cached_property
-    def _differences(self) -> tuple[Array, tuple[Array, Array, Array]]:
-        """Steps of time, and weights of a value and its neighbours in how fast it changes."""
-        step = np.diff(self.points["time"].value, axis=0)
-        before, after = step[:-1], step[1:]
+    def _differences(self) -> tuple[Array, Array, Array]:
+        """Weights of a value and its neighbours, before and after, in how fast it changes."""
+        time, records = self.points["time"].value, self.records
+        step = records.changes(time)
+        step[records.begins] = np.inf
+        before, after = 1.0 / step, 1.0 / np.append(step[1:], np.inf)
+        # Nearer ones tell more. Where a record begins or ends the two steps are one.
         both = before + after
-        return step, (
-            -after / (before * both),
-            (after - before) / (before * after),
-            before / (after * both),
-        )
+        share = np.divide(before, both, out=np.zeros_like(both), where=both > 0.0)
+        return -share * before, share * before - (1.0 - share) * after, (1.0 - share) * after
 
     def moved(
         self,
@@ -216,7 +204,7 @@ class RecordedRig:
             added = variant.added_travel(at, at)
             faster = sum(derivative_of(added, at[n]) * PER_SECOND[n](at) for n in variant.of)
             self._compiled[key] = marched.define({"faster": faster}, {})
-        known = {"displacement": self.points["D"], "time": self._since_start}
+        known = {"displacement": self.points["D"], "time": self.since_start}
         return self._compiled[key](known | {"speed": self.points["D_rate"]}, values)["faster"]
 
     def reading(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:

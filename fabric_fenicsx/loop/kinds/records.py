@@ -1,9 +1,10 @@
-"""Records of a crosshead's motions side by side, point by point, and a crossing along them."""
+"""Records of a crosshead's motions, one after the other, and a crossing along them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -19,19 +20,19 @@ __all__ = [
     "FEWEST_BEFORE",
     "FEWEST_BY_TURNS",
     "SHARP",
+    "Records",
     "between_runs",
     "earlier_alike",
     "laid_out",
     "last_run",
     "of_a_crossing",
     "one_alone",
-    "one_point_before",
     "runs_before",
-    "shifted",
     "typical",
 ]
 
 Array = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.int64]
 
 #: Runs before another that a term by the run needs: what two runs differ by is anything.
 FEWEST_BEFORE = 2
@@ -43,36 +44,84 @@ SHARP = 0.05
 BEFORE = 1e-9
 
 
-def laid_out(
-    motions: Sequence[Motion],
-) -> tuple[dict[str, Varying], tuple[npt.NDArray[np.int64], ...]]:
-    """Records side by side; the shorter ones rest at their last point.
+@dataclass(frozen=True, eq=False)
+class Records:
+    """Where records stand that follow each other.
+
+    Attributes:
+        run: number of the record of each point, from 0, not falling, (n_points,).
+    """
+
+    run: Numbers
+
+    @cached_property
+    def begins(self) -> Numbers:
+        """The first point of each record, (n_records,)."""
+        return np.flatnonzero(np.diff(self.run, prepend=-1))
+
+    @cached_property
+    def ends(self) -> Numbers:
+        """The last point of each record, (n_records,)."""
+        return np.flatnonzero(np.diff(self.run, append=self.run[-1] + 1))
+
+    @cached_property
+    def before(self) -> Numbers:
+        """The point before each one, or itself where a record begins, (n_points,)."""
+        found = np.arange(-1, len(self.run) - 1)
+        found[self.begins] = self.begins
+        return found
+
+    @cached_property
+    def after(self) -> Numbers:
+        """The point after each one, or itself where a record ends, (n_points,)."""
+        found = np.arange(1, len(self.run) + 1)
+        found[self.ends] = self.ends
+        return found
+
+    def of(self, run: int) -> slice:
+        """The points of a record."""
+        return slice(int(self.begins[run]), int(self.ends[run]) + 1)
+
+    def one_point_before(self, x: Varying) -> Varying:
+        """What something is at the point before; where a record begins what it is there."""
+        shape = x.value.shape
+        slopes = {p: spread(slope, shape)[self.before] for p, slope in x.slopes.items()}
+        return Varying(x.value[self.before], slopes)
+
+    def changes(self, values: Array) -> Array:
+        """From the point before each one; 0 where a record begins."""
+        return np.asarray(values - values[self.before])
+
+    def so_far(self, values: Array) -> Array:
+        """Sums from where each record begins, and without what is there."""
+        sums = np.cumsum(values, axis=0)
+        return np.asarray(sums - sums[self.begins][self.run])
+
+
+def laid_out(motions: Sequence[Motion]) -> tuple[dict[str, Varying], Records, Numbers]:
+    """Records one after the other.
 
     Returns:
         By name, time [s], place D [mm] and speed D_rate [mm/s] of the crosshead and 1 over the step
-        to each point [1/s], (n_points, n_runs); and point and run of every reading, (n,) each.
+        to each point [1/s], (n_points,); where the records stand; and the point of every reading,
+        (n,).
     """
-    longest = max(len(p.time) for p in motions)
-    shape = (longest, len(motions))
-    time, D, rate = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-    places = []
-    for r, p in enumerate(motions):
-        count = len(p.time)
-        time[:count, r], D[:count, r], rate[:count, r] = p.time, p.displacement, p.rate
-        time[count:, r] = p.time[-1] + np.arange(1, longest - count + 1)
-        D[count:, r] = p.displacement[-1]
+    counts = [len(p.time) for p in motions]
+    readings = []
+    for p, begin in zip(motions, np.cumsum([0, *counts]), strict=False):
         rows = np.flatnonzero(p.reading >= 0)
-        places.append((rows[np.argsort(p.reading[rows])], np.full(len(p.certain), r)))
-    step = np.diff(time, axis=0, prepend=time[:1])
+        readings.append(begin + rows[np.argsort(p.reading[rows])])
+    records = Records(np.repeat(np.arange(len(motions)), counts))
+    time, D, rate = (
+        np.concatenate([getattr(p, name) for p in motions])
+        for name in ("time", "displacement", "rate")
+    )
+    step = records.changes(time)
     # Nothing has happened before the first point.
-    step[0] = BEFORE
-    points = {
-        "time": Varying(time),
-        "D": Varying(D),
-        "D_rate": Varying(rate),
-        "per_time": Varying(1.0 / step),
-    }
-    return points, tuple(np.concatenate(part) for part in zip(*places, strict=True))
+    step[records.begins] = BEFORE
+    columns = {"time": time, "D": D, "D_rate": rate, "per_time": 1.0 / step}
+    points = {name: Varying(values) for name, values in columns.items()}
+    return points, records, np.concatenate(readings)
 
 
 def runs_before(readings: Readings) -> dict[str, Array]:
@@ -140,15 +189,3 @@ def of_a_crossing(marched: Marched, number: int) -> Crossing:
 def _remembered(marched: Marched, number: int, name: str) -> Any:
     """A memory of one of several laws, which may use the same names."""
     return marched.remembered(f"{number} {name}")
-
-
-def shifted(values: Array) -> Array:
-    """At the point before; at the first point the value there."""
-    return np.concatenate([values[:1], values[:-1]])
-
-
-def one_point_before(x: Varying) -> Varying:
-    """The same of what depends on parameters."""
-    shape = x.value.shape
-    slopes = {p: shifted(spread(slope, shape)) for p, slope in x.slopes.items()}
-    return Varying(shifted(x.value), slopes)

@@ -16,6 +16,7 @@ from ..expressions.marching import Varying
 from ..inference.first_order import SMALL
 from .giving_way import BY_TRAVEL, Added, in_series
 from .picture_frame.variant import FrameVariant
+from .records import Records
 
 __all__ = ["Slips", "left_by"]
 
@@ -30,9 +31,14 @@ LITTLE_NEARER = 0.5
 
 
 class Slips:
-    """What forms that slip added to the travel, beside which forms with which parameters."""
+    """What forms that slip added to the travel, beside which forms with which parameters.
 
-    def __init__(self) -> None:
+    Args:
+        records: of the rig.
+    """
+
+    def __init__(self, records: Records) -> None:
+        self._records = records
         self._known: dict[FrameVariant, list[_Known]] = {}
 
     def clear(self) -> None:
@@ -71,7 +77,7 @@ class Slips:
                 return known
         found: tuple[Varying, ...]
         if variant.in_series:
-            found = in_series(added, travel, variant.rounds)
+            found = in_series(added, travel, variant.rounds, self._records)
         else:
             found = (left_by(added, travel, variant.rounds),)
         before = [one for one in self._known.get(variant, ()) if one[0] != tuple(variants)]

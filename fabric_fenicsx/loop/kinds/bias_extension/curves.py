@@ -17,7 +17,6 @@ from scipy.interpolate import PPoly
 from ....errors import SolveError
 from ....mechanics.laws.tabulated import TabulatedSpring
 from ...expressions.marching import Varying
-from ..records import shifted
 
 __all__ = ["KNOTS", "NOTHING", "Curve", "Moment", "at_knots"]
 
@@ -128,7 +127,7 @@ def _along(moment: Moment, ways: Array, rate: float) -> Varying:
     direction = np.sign(np.diff(ways, axis=0, prepend=-1.0))
     known = {
         "gamma": Varying(ways),
-        "gamma_n": Varying(shifted(ways)),
+        "gamma_n": Varying(np.concatenate([ways[:1], ways[:-1]])),
         "rate": Varying(rate * direction),
         "per_time": Varying(np.broadcast_to(rate / ways[1], ways.shape)),
     }

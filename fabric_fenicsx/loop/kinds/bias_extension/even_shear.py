@@ -26,10 +26,11 @@ import numpy.typing as npt
 
 from ....fabric.bias_strip import BiasStrip
 from ....inputs.parameters import Parameter
-from ...expressions.marching import Varying
+from ...expressions.marching import Varying, spread
+from ..records import Records
 from .mixture import Part, Travels, number, of_ways
 
-__all__ = ["EVEN", "IN_WORDS", "SHARES", "ZONES", "EvenZones", "beside", "in_zones", "of_both"]
+__all__ = ["EVEN", "IN_WORDS", "SHARES", "ZONES", "EvenZones", "beside", "of_both"]
 
 Array = npt.NDArray[np.float64]
 
@@ -60,27 +61,27 @@ class EvenZones:
 
     Args:
         strips: of the runs; as for ``BiasStrip.areas``.
+        records: where these stand.
 
     Raises:
         ValueError: as there.
     """
 
-    def __init__(self, strips: Sequence[BiasStrip]) -> None:
-        self._strips = list(strips)
-        self._free = np.array([strip.pull(np.zeros(1))[0] for strip in strips])
-        self._ends = np.array([_ends(strip) for strip in strips]).T
+    def __init__(self, strips: Sequence[BiasStrip], records: Records) -> None:
+        self._strips, self._records = list(strips), records
+        self._free = np.array([strip.pull(np.zeros(1))[0] for strip in strips])[records.run]
         #: The last travel that was asked for, most often the recorded one, and its angle.
         self._last: tuple[Varying, tuple[Varying, Varying]] | None = None
         #: Of fabric [mm²], (n_runs, ZONES).
         self.areas = np.array([strip.areas() for strip in strips])
 
     def angle(self, parts: Sequence[Part], travels: Travels, D: Varying) -> tuple[Varying, Varying]:
-        """Angle γ of zone A [rad] and dγ/dD [rad/mm], (n_points, n_runs) each.
+        """Angle γ of zone A [rad] and dγ/dD [rad/mm], (n_points,) each.
 
         Args:
             parts: of the net's model, the first of them with pinned crossings.
             travels: of all runs.
-            D: the same [mm], (n_points, n_runs).
+            D: the same [mm], (n_points,).
         """
         if self._last is None or self._last[0] is not D:
             gamma = self._of_travel(D)
@@ -97,16 +98,20 @@ class EvenZones:
         return pinned * one, lever * one + pinned * change
 
     def lever(self, gamma: Varying) -> Varying:
-        """dγ/dD [rad/mm] of strips that do not slip, at angles of zone A, (n_points, n_runs)."""
+        """dγ/dD [rad/mm] of strips that do not slip, at angles of zone A, (n_points,)."""
         half = np.clip(gamma.value, -MOST, MOST) / 2.0
         pull = self._free * (np.cos(half) - np.sin(half))
         by_angle = self._free * (np.cos(half) + np.sin(half)) / (2.0 * pull**2)
         return Varying(1.0 / pull, {p: by_angle * slope for p, slope in gamma.slopes.items()})
 
     def _of_travel(self, D: Varying) -> Varying:
-        """The formula's angle, (n_points, n_runs)."""
-        columns = zip(self._strips, np.clip(D.value, *self._ends).T, strict=True)
-        gamma = np.stack([strip.angle(d) for strip, d in columns], axis=1)
+        """The formula's angle, (n_points,)."""
+        gamma = np.concatenate(
+            [
+                strip.angle(np.clip(D.value[self._records.of(run)], *_ends(strip)))
+                for run, strip in enumerate(self._strips)
+            ]
+        )
         lever = self.lever(Varying(gamma)).value
         return Varying(gamma, {p: lever * slope for p, slope in D.slopes.items()})
 
@@ -130,30 +135,12 @@ def _over(above: Varying, below: Varying, nothing: float = 1.0) -> Varying:
     return Varying(value, slopes)
 
 
-def in_zones(of_runs: Varying, scale: Array) -> Varying:
-    """Of each run its zones side by side, (n_points, n_runs ZONES).
-
-    Args:
-        of_runs: of zone A, (n_points, n_runs).
-        scale: of the zones over that, (ZONES,) or (n_runs, ZONES).
-    """
-
-    def spread(values: Array) -> Array:
-        return np.asarray(values[:, :, None] * scale).reshape(len(values), -1)
-
-    shape = of_runs.value.shape
-    slopes = {p: spread(np.broadcast_to(s, shape)) for p, s in of_runs.slopes.items()}
-    return Varying(spread(of_runs.value), slopes)
-
-
-def beside(groups: Varying, zones: Varying, count: int) -> Varying:
-    """Of each of so many runs first the groups of its net, then its zones, (n_points, n)."""
+def beside(groups: Varying, zones: Varying) -> Varying:
+    """The groups of a net, then its zones, (n_points, n)."""
 
     def joined(one: Array | float, other: Array | float) -> Array:
-        own, shape = np.broadcast_to(one, groups.value.shape), (len(groups.value), count, -1)
-        more = np.broadcast_to(other, zones.value.shape)
-        both = np.concatenate([own.reshape(shape), more.reshape(shape)], axis=2)
-        return both.reshape(len(both), -1)
+        own = spread(one, groups.value.shape), spread(other, zones.value.shape)
+        return np.concatenate(own, axis=1)
 
     names = groups.slopes | zones.slopes
     return Varying(
@@ -162,9 +149,9 @@ def beside(groups: Varying, zones: Varying, count: int) -> Varying:
     )
 
 
-def of_both(share: float, count: int, groups: int) -> Varying:
+def of_both(share: float, groups: int) -> Varying:
     """What groups of the net and zones count for, (n,), with the share that shears evenly."""
-    zones = np.tile(np.repeat([0.0, 1.0], [groups, ZONES]), count)
+    zones = np.repeat([0.0, 1.0], [groups, ZONES])
     return Varying(
         np.where(zones == 1.0, share, 1.0 - share), {EVEN.name: np.where(zones == 1.0, 1.0, -1.0)}
     )

@@ -7,28 +7,21 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...expressions.marching import Varying
-from ..records import one_point_before
-from .even_shear import SHARES, ZONES, EvenZones, beside, in_zones
+from ...expressions.marching import Varying, spread
+from .even_shear import SHARES, EvenZones, beside
+from .going_runs import GoingRuns
 from .mixture import Part, Travels, of_groups
-from .ways import GROUPS
 
-__all__ = ["columns_of", "gone"]
+__all__ = ["gone"]
 
 Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
-
-
-def columns_of(even: EvenZones | None) -> int:
-    """How many columns a strip has: groups of its crossings, and zones that shear evenly."""
-    return GROUPS if even is None else GROUPS + ZONES
 
 
 def gone(
     parts: Sequence[Part],
     travels: Travels,
     motion: Mapping[str, Varying],
-    runs: Numbers,
+    going: GoingRuns,
     even: EvenZones | None,
 ) -> dict[str, Varying]:
     """What laws of crossings take, and what their moments are weighed by; see CrossheadTest.
@@ -36,43 +29,42 @@ def gone(
     Args:
         parts: of the strips' model.
         travels: of all runs.
-        motion: travels D [mm], their rates D_rate [mm/s] and per_time [1/s], (n_points, n_runs).
-        runs: those that go their own way.
+        motion: travels D [mm], their rates D_rate [mm/s] and per_time [1/s], (n_points,).
+        going: runs that go their own way.
         even: zones that shear evenly, of all runs; None: there are none.
 
     Returns:
-        By name, of each of these runs its columns side by side, (n_points, n).
+        By name, groups of the net's crossings side by side, and behind them the zones,
+        (n_points_of_crossings, n), or what is the same of all, (n_points_of_crossings, 1).
     """
-    D, columns, shape = motion["D"], columns_of(even), motion["D"].value.shape
+    D, shape = motion["D"], motion["D"].value.shape
 
-    def each(values: Array, times: int) -> Array:
-        return np.repeat(np.broadcast_to(values, shape)[:, runs], times, axis=1)
+    def own(of_points: Varying) -> Varying:
+        """In a column, of the points of those runs."""
 
-    along = {p: each(slope, GROUPS) for p, slope in D.slopes.items()}
+        def column(values: Array) -> Array:
+            return spread(values, shape)[going.points, None]
+
+        slopes = {p: column(slope) for p, slope in of_points.slopes.items()}
+        return Varying(column(of_points.value), slopes)
+
+    along = own(D).slopes
     gamma = of_groups(parts, travels, "gamma", along)
     lever = of_groups(parts, travels, "lever", along)
-    factor = Varying(np.concatenate([parts[0].solved.ways[r].area for r in runs])) * lever
+    area = np.stack([parts[0].solved.ways[run].area for run in going.runs])
+    factor = Varying(area[going.records.run]) * lever
     if even is not None:
-
-        def own(of_runs: Varying, scale: Array) -> Varying:
-            """Of the zones of those runs."""
-            slopes = {p: np.broadcast_to(s, shape)[:, runs] for p, s in of_runs.slopes.items()}
-            return in_zones(Varying(of_runs.value[:, runs], slopes), scale)
-
         zone, zone_lever = even.angle(parts, travels, D)
-        gamma = beside(gamma, own(zone, SHARES), len(runs))
-        lever = beside(lever, own(zone_lever, SHARES), len(runs))
-        weighed = own(even.lever(zone), SHARES * even.areas[runs])
-        factor = beside(factor, weighed, len(runs))
-    speed = motion["D_rate"]
-    pace = Varying(
-        each(speed.value, columns), {p: each(slope, columns) for p, slope in speed.slopes.items()}
-    )
+        shares = Varying(SHARES)
+        gamma = beside(gamma, own(zone) * shares)
+        lever = beside(lever, own(zone_lever) * shares)
+        areas = Varying(SHARES * even.areas[going.runs][going.records.run])
+        factor = beside(factor, own(even.lever(zone)) * areas)
     return {
         "gamma": gamma,
-        "gamma_n": one_point_before(gamma),
-        "rate": lever * pace,
-        "per_time": Varying(each(motion["per_time"].value, columns)),
+        "gamma_n": going.records.one_point_before(gamma),
+        "rate": lever * own(motion["D_rate"]),
+        "per_time": own(motion["per_time"]),
         "rate_per_speed": lever,
         "factor": factor,
     }

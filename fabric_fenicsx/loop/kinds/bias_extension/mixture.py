@@ -13,6 +13,8 @@ import numpy.typing as npt
 
 from ...expressions.marching import Varying
 from ...kept import Kept
+from ..records import Records
+from .going_runs import GoingRuns
 from .phases import Parted, Phase
 from .solved import Solved
 from .ways import GROUPS, Name, polynomial
@@ -50,9 +52,9 @@ class Travels:
     """Travels of all runs, and what solved strips say there.
 
     Args:
-        D: travels [mm], (n_points, n_runs).
+        D: travels [mm], (n_points,).
         parted: the points at which each run's crosshead does what; see phases.parted.
-        of: runs whose crossings are wanted; by default all.
+        going: runs whose crossings are wanted; by default all.
         kept: whether all that strips say is kept: of travels that are asked for again and again.
     """
 
@@ -60,13 +62,13 @@ class Travels:
         self,
         D: Array,
         parted: Parted,
-        of: Sequence[int] | npt.NDArray[np.int64] | None = None,
+        going: GoingRuns | None = None,
         *,
         kept: bool = False,
     ) -> None:
         self._D, self._parted = D, parted
         self._stops = any(one == Phase.STOPPED for own in parted for one, _ in own)
-        self._runs = range(D.shape[1]) if of is None else of
+        self._going = going
         most = min(KEPT, MOST_NUMBERS // max(D.size * GROUPS, 1)) if kept else FEW
         self._known: Kept[Array] = Kept(most)
         self._pieces: Kept[tuple[Array, Array]] = Kept(1 if kept else FEW)
@@ -77,7 +79,7 @@ class Travels:
         Not to be written to.
 
         Returns:
-            (n_points, n_groups) of all wanted runs together, or (n_points, n_runs).
+            (n_points_of_crossings, GROUPS), or (n_points,).
         """
         if name == "lever" and not (self._stops and any(way.stopped for way in solved.ways)):
             name, order = "gamma", order + 1
@@ -86,7 +88,7 @@ class Travels:
 
     def _evaluated(self, solved: Solved, name: Name, order: int) -> Array:
         pieces, s = self._pieces((solved, name), (), lambda: self._cubics(solved, name))
-        found = polynomial(pieces, s, order).reshape(len(self._D), -1)
+        found = polynomial(pieces, s, order)
         found.flags.writeable = False
         return found
 
@@ -94,17 +96,20 @@ class Travels:
         """Coefficients of the cubics that travels are on, the highest first, and how far on [mm].
 
         Returns:
-            (4, n_points, n_runs, n_groups) and (n_points, n_runs, 1).
+            (4, n_points_of_crossings, GROUPS) and (n_points_of_crossings, 1), or (4, n_points) and
+            (n_points,).
         """
         of_groups = name in ("gamma", "lever")
-        runs = self._runs if of_groups else range(len(solved.ways))
-        pieces = np.empty((4, len(self._D), len(runs), GROUPS if of_groups else 1))
-        s = np.empty((*pieces.shape[1:3], 1))
-        for k, r in enumerate(runs):
+        going = self._going if of_groups else None
+        count = len(self._D) if going is None else len(going.points)
+        pieces = np.empty((4, count, *([GROUPS] if of_groups else [])))
+        s = np.empty((count, *([1] if of_groups else [])))
+        for r in range(len(solved.ways)) if going is None else going.runs:
             for one, points in self._parted[r]:
-                own, on = solved.ways[r].cubics(name, one, self._D[points, r])
-                pieces[:, points, k] = own.reshape(4, len(points), -1)
-                s[points, k, 0] = on
+                own, on = solved.ways[r].cubics(name, one, self._D[points])
+                at = points if going is None else going.at[points]
+                pieces[:, at] = own
+                s[at] = on.reshape(len(on), *s.shape[1:])
         return pieces, s
 
 
@@ -112,15 +117,16 @@ class Holds:
     """Where crossheads stand still with strips pulled furthest, and what these still exert there.
 
     Args:
-        since: time since they stopped [s], NaN elsewhere, (n_points, n_runs).
+        since: time since they stopped [s], NaN elsewhere, (n_points,).
+        records: where the runs stand.
     """
 
-    def __init__(self, since: Array) -> None:
-        self._since = since
+    def __init__(self, since: Array, records: Records) -> None:
+        self._since, self._records = since, records
         self._known: Kept[Array] = Kept(KEPT)
 
     def of(self, parts: Sequence[Part], name: Literal["force", "middle"]) -> Varying:
-        """What is left of the way to rest, (n_points, n_runs).
+        """What is left of the way to rest, (n_points,).
 
         Args:
             parts: of the model.
@@ -138,7 +144,8 @@ class Holds:
         found = np.zeros(self._since.shape)
         for r, way in enumerate(solved.ways):
             if way.hold is not None:
-                found[:, r] = way.hold.at(name, self._since[:, r])
+                mine = self._records.of(r)
+                found[mine] = way.hold.at(name, self._since[mine])
         found.flags.writeable = False
         return found
 
@@ -149,13 +156,13 @@ def of_groups(
     name: Literal["gamma", "lever"],
     slopes: Mapping[str, Array] = MappingProxyType({}),
 ) -> Varying:
-    """Angles of all groups, or their levers dγ/dD, (n_points, n_groups).
+    """Angles of all groups, or their levers dγ/dD, (n_points_of_crossings, GROUPS).
 
     Args:
         parts: of the model.
         travels: of its runs.
         name: which of the two.
-        slopes: derivatives of the travels by parameter, (n_points, n_groups) each.
+        slopes: derivatives of the travels by parameter, (n_points_of_crossings, 1) each.
     """
     total = number(0.0)
     for part in parts:
@@ -171,14 +178,14 @@ def of_ways(
     name: Literal["rest", "middle"],
     order: int = 0,
 ) -> Varying:
-    """What the ways of strips say, (n_points, n_runs): their rest, or the angle of the middle.
+    """What the ways of strips say, (n_points,): their rest, or the angle of the middle.
 
     The first goes with the size of the forces.
 
     Args:
         parts: of the model.
         travels: of its runs.
-        slopes: derivatives of the travels by parameter, (n_points, n_runs) each.
+        slopes: derivatives of the travels by parameter, (n_points,) each.
         name: which of the two.
         order: of a derivative in the travel.
     """

@@ -33,11 +33,13 @@ from ..crosshead import CrossheadTest
 from ..picture_frame.model import SAME_RATE
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
+from ..records import Records
 from .curves import KNOTS, Curve, Moment, at_knots
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
 from .even_shear import EVEN, IN_WORDS, EvenZones, of_both
 from .frame_law import crossing_laws, foretold, foretold_in_words, locking, locking_variant
-from .going import columns_of, gone
+from .going import gone
+from .going_runs import GoingRuns
 from .mixture import Holds, Part, Travels, number, of_ways
 from .phases import Phase, parted
 from .pulls import pulls_of
@@ -108,7 +110,7 @@ class BiasExtension(CrossheadTest):
         forces = self.readings.fit & self.readings.first
         if not forces.any():
             return []
-        return strip_terms(self._ranges(), self._ends(), goes_back=bool(self._back.any()))
+        return strip_terms(self._ranges(), self._ends(), goes_back=bool(self._goes_back.any()))
 
     def _ranges(self) -> dict[str, float]:
         readings, given = self.readings, self._recorded.given
@@ -171,8 +173,9 @@ class BiasExtension(CrossheadTest):
         """
         solved = self._strips.solved({}, curve)
         D, phase = self._points["D"].value, self._phase
-        force = np.stack(
-            [way.force(D[:, r], phase[:, r], curve) for r, way in enumerate(solved.ways)], axis=1
+        own = [self._recorded.records.of(run) for run in range(len(solved.ways))]
+        force = np.concatenate(
+            [way.force(D[at], phase[at], curve) for way, at in zip(solved.ways, own, strict=True)]
         )
         rows = self.readings.usable & self.readings.first
         expected, travel = (self._recorded.at_readings(values)[rows] for values in (force, D))
@@ -202,27 +205,28 @@ class BiasExtension(CrossheadTest):
         )
 
     def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
-        D, time = self._points["D"].value, self._points["time"].value
+        records = self._recorded.records
+        D, time, speed = (self._points[name].value for name in ("D", "time", "D_rate"))
         self._runs = list(runs)
-        moves = D, time, self._points["D_rate"].value
-        points, of = self._recorded.place
-        pulls = pulls_of(runs, self._parent, *moves, (points, of))
-        self._furthest, self._back, self._phase = pulls.furthest, pulls.on_its_way_back, pulls.phase
-        self._holds = Holds(pulls.since)
+        pulls = pulls_of(runs, self._parent, D, time, speed, records, self._recorded.readings)
+        self._furthest, self._goes_back = pulls.furthest, pulls.goes_back
+        self._phase, self._holds = pulls.phase, Holds(pulls.since, records)
         # An angle is read of a strip whose force is, mostly at the same places: its crossings go
         # as they do in that run.
-        moved = np.stack([self._points[name].value for name in ("time", "D", "D_rate")])
-        goes_as = [
-            force if np.array_equal(moved[..., force], moved[..., run]) else run
-            for run, force in enumerate(self._parent)
-        ]
-        self._going_runs, self._goes_as = np.unique(goes_as, return_inverse=True)
-        self._parted = parted(self._phase)
-        self._recorded_travels = Travels(D, self._parted, self._going_runs, kept=True)
+        moved = [np.stack([D, time, speed])[:, records.of(run)] for run in range(len(runs))]
+        goes_as = np.array(
+            [
+                force if np.array_equal(moved[force], moved[run]) else run
+                for run, force in enumerate(self._parent)
+            ]
+        )
+        self._going = GoingRuns(records, goes_as)
+        self._parted = parted(self._phase, records)
+        self._recorded_travels = Travels(D, self._parted, self._going, kept=True)
 
         def going(solved: Solved) -> dict[str, Varying]:
             parts = [Part(solved, number(1.0))]
-            return self._going(parts, self._points["D"], self._points["D_rate"])
+            return self._gone(parts, self._points["D"], self._points["D_rate"])
 
         self._of_recorded = lru_cache(maxsize=MOTIONS)(going)
         for (m, run), travel, pace in zip(runs, pulls.furthest, pulls.speed, strict=True):
@@ -254,7 +258,7 @@ class BiasExtension(CrossheadTest):
             "free_length": self._recorded.each(length - width),
             "pinned_angle": Varying(self._recorded_travels.of(first, "middle")),
         }
-        out = WaysOut(self._furthest, self._typical_rate, self._top, bool(self._back.any()))
+        out = WaysOut(self._furthest, self._typical_rate, self._top, bool(self._goes_back.any()))
         self._models = StripModels(self._strips, first, out, self._moment_of)
 
     def _half_way(self, speed: Array) -> float:
@@ -277,10 +281,10 @@ class BiasExtension(CrossheadTest):
         Angles do, and forces of strips that go back: those of one way out know a curve alone.
         """
         fitted = np.array([not run.holdout for _, run in runs])
-        if not (self.may_be_even and (fitted & (self._angles | self._back.any(axis=0))).any()):
+        if not (self.may_be_even and (fitted & (self._angles | self._goes_back)).any()):
             return None
         try:
-            return EvenZones([strip_of(m, run) for m, run in runs])
+            return EvenZones([strip_of(m, run) for m, run in runs], self._recorded.records)
         except ValueError:
             return None
 
@@ -370,25 +374,21 @@ class BiasExtension(CrossheadTest):
 
     # Model --------------------------------------------------------------------------------
 
-    @cached_property
-    def _counts(self) -> Array:
-        return np.repeat(self._recorded.counts[self._going_runs], columns_of(self._even))
+    @property
+    def _of_crossings(self) -> Records:
+        return self._going.records
 
     def _gathered(self, values: Array) -> Array:
-        return np.asarray(self._in_groups(values).sum(axis=2))[:, self._goes_as]
+        return np.asarray(values.sum(axis=1)[self._going.at])
 
     def _shown(self, values: Array) -> Array:
-        return self._recorded.at_readings(self._in_groups(values)[:, self._goes_as, GROUPS - 1])
-
-    def _in_groups(self, values: Array) -> Array:
-        """Of the crossings of each run that goes its own way, (n_points, n, n_columns)."""
-        return values.reshape(len(values), len(self._going_runs), columns_of(self._even))
+        return self._recorded.at_readings(values[self._going.at, GROUPS - 1])
 
     def _travels(self, D: Varying) -> Travels:
         """Travels of a model; most have those of the crossheads."""
         if D is self._points["D"]:
             return self._recorded_travels
-        return Travels(D.value, self._parted, self._going_runs)
+        return Travels(D.value, self._parted, self._going)
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]
@@ -398,17 +398,16 @@ class BiasExtension(CrossheadTest):
             # The same arrays again: what laws make of them alone is kept; see Marched.
             found = self._of_recorded(one.solved)
         else:
-            found = self._going(self._mixture, D, speed)
+            found = self._gone(self._mixture, D, speed)
         if self._even is None:
             return found
         share = values.get(EVEN.name, 0.0)
-        weights = of_both(share, len(self._going_runs), GROUPS)
-        return {**found, "factor": found["factor"] * weights}
+        return {**found, "factor": found["factor"] * of_both(share, GROUPS)}
 
-    def _going(self, parts: Sequence[Part], D: Varying, speed: Varying) -> dict[str, Varying]:
+    def _gone(self, parts: Sequence[Part], D: Varying, speed: Varying) -> dict[str, Varying]:
         """How the crossings of solved strips go at some travels; see _kinematics."""
         motion = {"D": D, "D_rate": speed, "per_time": self._points["per_time"]}
-        return gone(parts, self._travels(D), motion, self._going_runs, self._even)
+        return gone(parts, self._travels(D), motion, self._going, self._even)
 
     def _force(
         self,
@@ -423,10 +422,11 @@ class BiasExtension(CrossheadTest):
         # Of runs of angles nothing else counts.
         degree = np.asarray(np.degrees(self._together.unit))
         angles = self._middle(travel, variants, values) * Varying(degree)
+        of_angle = self._angles[self._recorded.records.run]
         return Varying(
-            np.where(self._angles, angles.value, found.value),
+            np.where(of_angle, angles.value, found.value),
             {
-                p: np.where(self._angles, angles.slopes.get(p, 0.0), found.slopes.get(p, 0.0))
+                p: np.where(of_angle, angles.slopes.get(p, 0.0), found.slopes.get(p, 0.0))
                 for p in found.slopes | angles.slopes
             },
         )
@@ -455,7 +455,7 @@ class BiasExtension(CrossheadTest):
     def _middle(
         self, travel: Any, variants: Sequence[Variant], values: Mapping[str, float]
     ) -> Varying:
-        """Mean shear angle of the middle zone [rad], (n_points, n_runs)."""
+        """Mean shear angle of the middle zone [rad], (n_points,)."""
         D, travels = travel["D"], self._travels(travel["D"])
         middle = of_ways(self._mixture, travels, D.slopes, "middle")
         middle += self._holds.of(self._mixture, "middle")
@@ -471,8 +471,8 @@ class BiasExtension(CrossheadTest):
         return self._pull
 
     def _correction(self, variants: Sequence[Variant], travel: Any, quantity: Quantity) -> Varying:
-        """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
-        at = travel["D"], self._phase, self._holds
+        """What forces, or angles, were off by where the model was solved, (n_points,)."""
+        at = travel["D"], self._parted, self._holds
         return self._models.correction(variants, quantity, *at)
 
     def middle_angle(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Array:

@@ -8,6 +8,8 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
+from ..records import Records
+
 __all__ = [
     "GONE_BACK",
     "SIGN",
@@ -47,66 +49,67 @@ Parted = Sequence[Sequence[tuple[Phase, npt.NDArray[np.int64]]]]
 """Of each run what its crosshead does, and the numbers of the points where it does."""
 
 
-def parted(phases: Phases) -> Parted:
+def parted(phases: Phases, records: Records) -> Parted:
     """The points of each run by what its crosshead does there.
 
     Args:
-        phases: (n_points, n_runs).
+        phases: (n_points,).
+        records: where the runs stand.
     """
     return [
-        [(Phase(one), np.flatnonzero(run == one)) for one in np.unique(run)] for run in phases.T
+        [
+            (Phase(one), np.flatnonzero((records.run == run) & (phases == one)))
+            for one in np.unique(phases[records.of(run)])
+        ]
+        for run in range(len(records.begins))
     ]
 
 
 def moving(speed: Array) -> Array:
-    """Speeds of crossheads [mm/s], nothing where they stand still, (n_points, n_runs)."""
-    return np.asarray(np.where(np.abs(speed) > STILL * np.abs(speed).max(axis=0), speed, 0.0))
+    """Speeds of a crosshead [mm/s], nothing where it stands still, (n,)."""
+    return np.asarray(np.where(np.abs(speed) > STILL * np.abs(speed).max(), speed, 0.0))
 
 
-def backward(D: Array, speed: Array) -> Flags:
-    """Where crossheads are on a way back: at rest, as before it, (n_points, n_runs)."""
-    last = np.maximum.accumulate(np.where(speed != 0.0, np.arange(len(D))[:, None], 0), axis=0)
-    return np.take_along_axis(speed, last, axis=0) < 0.0
+def backward(speed: Array) -> Flags:
+    """Where a crosshead is on a way back: at rest, as before it, (n,)."""
+    last = np.maximum.accumulate(np.where(speed != 0.0, np.arange(len(speed)), 0))
+    return np.asarray(speed[last] < 0.0)
 
 
-def speed_out(D: Array, time: Array, speed: Array) -> Array:
-    """Mean speed of crossheads [mm/s] on their way to where they get furthest, (n_runs,).
+def speed_out(D: Array, time: Array, speed: Array) -> float:
+    """Mean speed of a crosshead [mm/s] on its way to where it gets furthest.
 
-    While they move: the furthest place of all may be read anywhere in a hold.
+    While it moves: the furthest place of all may be read anywhere in a hold.
     """
-    on_its_way = (np.arange(len(D))[1:, None] <= np.argmax(D, axis=0)) & (speed[1:] > 0.0)
-    way, took = (
-        np.sum(np.where(on_its_way, np.diff(values, axis=0), 0.0), axis=0) for values in (D, time)
-    )
-    return np.asarray(way / np.maximum(took, 1e-9))
+    on_its_way = (np.arange(len(D))[1:] <= np.argmax(D)) & (speed[1:] > 0.0)
+    way, took = (float(np.diff(values)[on_its_way].sum()) for values in (D, time))
+    return way / max(took, 1e-9)
 
 
 def phases_of(D: Array, speed: Array, back: Flags) -> Phases:
-    """What crossheads do, by Phase, (n_points, n_runs); where they begin they are on their way."""
-    stopped = (speed == 0.0) & ~back & (D > GONE_BACK * D.max(axis=0))
+    """What a crosshead does, by Phase, (n,); where it begins it is on its way."""
+    stopped = (speed == 0.0) & ~back & (D > GONE_BACK * D.max())
     found = np.where(stopped, Phase.STOPPED, np.where(back, Phase.BACK, Phase.OUT))
     return np.asarray(found, dtype=np.int8)
 
 
-def since_stop(D: Array, time: Array, speed: Array, phases: Phases, furthest: Array) -> Array:
-    """Time since crossheads stopped where their strips get furthest [s], (n_points, n_runs).
+def since_stop(D: Array, time: Array, speed: Array, phases: Phases, furthest: float) -> Array:
+    """Time since a crosshead stopped where its strip gets furthest [s], (n,).
 
-    NaN elsewhere. Where they stopped between two points they went on at their speed until then.
+    NaN elsewhere. Where it stopped between two points it went on at its speed until then.
 
     Args:
-        D: travels of the crossheads [mm], (n_points, n_runs).
-        time: at the points [s], (n_points, n_runs).
-        speed: of the crossheads [mm/s], (n_points, n_runs).
-        phases: what they do, (n_points, n_runs).
-        furthest: that their strips get [mm], (n_runs,).
+        D: travels [mm], (n,).
+        time: at the points [s], (n,).
+        speed: [mm/s], (n,).
+        phases: what it does, (n,).
+        furthest: that its strip gets [mm].
     """
-    found = np.full(D.shape, np.nan)
     held = (phases == Phase.STOPPED) & (D >= (1.0 - GONE_BACK) * furthest)
-    for r in np.flatnonzero(held.any(axis=0)):
-        first = int(np.argmax(held[:, r]))
-        before = max(first - 1, 0)
-        pace = speed[before, r]
-        on = (D[first, r] - D[before, r]) / pace if pace > 0.0 else 0.0
-        stopped = min(time[before, r] + on, time[first, r])
-        found[held[:, r], r] = (time[:, r] - stopped)[held[:, r]]
-    return found
+    if not held.any():
+        return np.full(len(D), np.nan)
+    first = int(np.argmax(held))
+    before = max(first - 1, 0)
+    pace = speed[before]
+    on = (D[first] - D[before]) / pace if pace > 0.0 else 0.0
+    return np.asarray(np.where(held, time - min(time[before] + on, time[first]), np.nan))

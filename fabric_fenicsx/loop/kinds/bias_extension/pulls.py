@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...measurement.schema import Measurement, Run
+from ..records import Records
 from .phases import (
     GONE_BACK,
     Phase,
@@ -43,8 +44,8 @@ class Pulls:
         stops: how often it is stopped on its way out; see solved_strip, (n_runs,).
         holds: how long it is held where it got furthest [s], (n_runs,).
         own_speed: mean speed of its crosshead on the way out [mm/s], (n_runs,).
-        on_its_way_back: where crossheads are on a way back, (n_points, n_runs).
-        phase: what they do, (n_points, n_runs).
+        goes_back: whether its crosshead ever is on a way back, (n_runs,).
+        phase: what crossheads do, (n_points,).
         since: time since they stopped where they got furthest [s]; see since_stop.
     """
 
@@ -54,7 +55,7 @@ class Pulls:
     stops: npt.NDArray[np.int64]
     holds: Array
     own_speed: Array
-    on_its_way_back: Flags
+    goes_back: Flags
     phase: Phases
     since: Array
 
@@ -65,38 +66,47 @@ def pulls_of(
     D: Array,
     time: Array,
     speed: Array,
-    read: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]],
+    records: Records,
+    read: npt.NDArray[np.int64],
 ) -> Pulls:
     """What the strips of some runs are solved for; those alike once, as far as one of them goes.
 
     Args:
         runs: with their measurements.
         parent: number of the run of forces that each belongs to, (n_runs,).
-        D: travels of the crossheads [mm], (n_points, n_runs).
-        time: at the points [s], (n_points, n_runs).
-        speed: of the crossheads [mm/s], (n_points, n_runs).
-        read: point and run of every reading: a record that is shorter than others rests at its
-            last point.
+        D: travels of the crossheads [mm], (n_points,).
+        time: at the points [s], (n_points,).
+        speed: of the crossheads [mm/s], (n_points,).
+        records: where the runs stand.
+        read: point of every reading, (n,).
     """
-    rate = moving(speed)
-    own_speed = speed_out(D, time, rate)
+    each = [records.of(run) for run in range(len(runs))]
+    rate = np.concatenate([moving(speed[own]) for own in each])
+    own_speed = np.array([speed_out(D[own], time[own], rate[own]) for own in each])
     own_pace = np.log(own_speed)[parent]
     paces = np.round(own_pace / np.log(PACE))
     kinds = [(m.fabric, m.rig, run.own, n) for (m, run), n in zip(runs, paces, strict=True)]
     alike = [[other == own for other in kinds] for own in kinds]
-    furthest = np.array([D.max(axis=0)[own].max() for own in alike])
-    on_its_way_back = backward(D, rate)
-    gone = np.max(np.where(on_its_way_back, furthest - D, 0.0), axis=0)
+    largest = np.maximum.reduceat(D, records.begins)
+    furthest = np.array([largest[own].max() for own in alike])
+    backwards = np.concatenate([backward(rate[own]) for own in each])
+    behind = np.where(backwards, furthest[records.run] - D, 0.0)
+    gone = np.maximum.reduceat(behind, records.begins)
     back = np.array([gone[own].max() for own in alike]) > GONE_BACK * furthest
-    on_its_way_back &= back
-    phase = phases_of(D, rate, on_its_way_back)
-    since = since_stop(D, time, rate, phase, furthest)
-    points, of = read
+    backwards &= back[records.run]
+    phase = np.concatenate([phases_of(D[own], rate[own], backwards[own]) for own in each])
+    since = np.concatenate(
+        [
+            since_stop(D[own], time[own], rate[own], phase[own], float(most))
+            for own, most in zip(each, furthest, strict=True)
+        ]
+    )
+    of = records.run[read]
     often = np.where(np.isnan(since), OFTEN, SELDOM)
     wanted = np.where(phase == Phase.STOPPED, often, 0)
     stopped, longest = np.zeros(len(runs), dtype=np.int64), np.zeros(len(runs))
-    np.maximum.at(stopped, of, wanted[points, of])
-    np.maximum.at(longest, of, np.nan_to_num(since[points, of]))
+    np.maximum.at(stopped, of, wanted[read])
+    np.maximum.at(longest, of, np.nan_to_num(since[read]))
     stops, holds = (np.array([most[own].max() for own in alike]) for most in (stopped, longest))
     return Pulls(
         furthest=furthest,
@@ -105,7 +115,7 @@ def pulls_of(
         stops=stops,
         holds=holds,
         own_speed=own_speed,
-        on_its_way_back=on_its_way_back,
+        goes_back=np.logical_or.reduceat(backwards, records.begins),
         phase=phase,
         since=since,
     )

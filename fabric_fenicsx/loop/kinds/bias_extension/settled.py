@@ -11,8 +11,9 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from ...expressions.marching import Varying
+from ..records import Records
 from .mixture import Holds, Part, Travels, number, of_groups, of_ways
-from .phases import SIGN, Phase, Phases, parted
+from .phases import SIGN, Parted, Phase, parted
 from .solved import Solved
 from .strip import SOON
 
@@ -42,16 +43,16 @@ class Correction:
     exact: Solved
     foretold: Sequence[Part]
 
-    def at(self, quantity: Quantity, D: Varying, phase: Phases, holds: Holds) -> Varying:
-        """At travels [mm], (n_points, n_runs)."""
-        at = np.clip(D.value, 0.0, self.furthest)
+    def at(self, quantity: Quantity, D: Varying, parted: Parted, holds: Holds) -> Varying:
+        """At travels [mm], (n_points,)."""
 
         def found(order: int) -> Array:
             lines = getattr(self, quantity)
-            total = np.zeros_like(at)
-            for one in np.unique(phase):
-                own = np.stack([line(at[:, r], order) for r, line in enumerate(lines[one])], axis=1)
-                total = np.where(phase == one, own, total)
+            total = np.zeros(D.value.shape)
+            for run, furthest in enumerate(self.furthest):
+                for one, points in parted[run]:
+                    at = np.clip(D.value[points], 0.0, furthest)
+                    total[points] = lines[one][run](at, order)
             return total
 
         along = found(1) if D.slopes else 0.0
@@ -69,27 +70,28 @@ def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Corr
         foretold: what forces and angles follow from otherwise.
         furthest: travel that each strip was solved up to [mm], (n_runs,).
     """
-    D, curve = ALONG[:, None] * furthest, exact.curve
-    area = np.stack([way.area for way in exact.ways])
-    speed = np.array([way.speed for way in exact.ways])[:, None]
+    D, curve = furthest[:, None] * ALONG, exact.curve
+    records = Records(np.repeat(np.arange(len(furthest)), len(ALONG)))
+    area = np.stack([way.area for way in exact.ways])[:, None]
+    speed = np.array([way.speed for way in exact.ways])[:, None, None]
     off: dict[str, list[list[PchipInterpolator]]] = {"force": [], "middle": []}
     for one in Phase:
         phase = np.full(D.shape, one, dtype=np.int8)
-        travels = Travels(D, parted(phase))
+        travels = Travels(D.ravel(), parted(phase.ravel(), records))
         gamma, lever = (
             of_groups(foretold, travels, name).value.reshape(*D.shape, -1)
             for name in ("gamma", "lever")
         )
         moments = curve.at(gamma, lever * speed * SIGN[one], phase[:, :, None] == Phase.BACK)
         work = np.sum(area * lever * moments, axis=2)
-        force, middle = (of_ways(foretold, travels, {}, n).value for n in ("rest", "middle"))
-        of_runs = [(way, D[:, r], phase[:, r]) for r, way in enumerate(exact.ways)]
+        force, middle = (
+            of_ways(foretold, travels, {}, n).value.reshape(D.shape) for n in ("rest", "middle")
+        )
+        of_runs = [*zip(exact.ways, D, phase, strict=True)]
         for name, known, own in (
             ("force", force + work, [way.force(d, p, curve) for way, d, p in of_runs]),
             ("middle", middle, [way.at("middle", d, p) for way, d, p in of_runs]),
         ):
-            missing = np.stack(own, axis=1) - known
-            off[name].append(
-                [PchipInterpolator(*line) for line in zip(D.T, missing.T, strict=True)]
-            )
+            missing = np.stack(own) - known
+            off[name].append([PchipInterpolator(*line) for line in zip(D, missing, strict=True)])
     return Correction(furthest, tuple(off["force"]), tuple(off["middle"]), exact, foretold)

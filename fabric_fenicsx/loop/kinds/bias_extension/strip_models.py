@@ -25,7 +25,7 @@ from ..picture_frame.variant import FrameVariant
 from .curves import Curve, Moment, at_knots
 from .effects import StripPullVariant
 from .mixture import Holds, Part, number
-from .phases import Phases
+from .phases import Parted
 from .settled import Correction, Quantity, correction
 from .solved import Solved, SolvedStrips, Wanted, reached
 from .strip import FINE_STEPS
@@ -151,12 +151,12 @@ class StripModels:
         variants: Sequence[Variant],
         quantity: Quantity,
         D: Varying,
-        phase: Phases,
+        parted: Parted,
         holds: Holds,
     ) -> Varying:
-        """What forces, or angles, were off by where the model was solved, (n_points, n_runs)."""
+        """What forces, or angles, were off by where the model was solved, (n_points,)."""
         off = self._corrections.get(solved_by(variants))
-        return number(0.0) if off is None else off.at(quantity, D, phase, holds)
+        return number(0.0) if off is None else off.at(quantity, D, parted, holds)
 
     def curve(self, variants: Sequence[Variant], values: Mapping[str, float]) -> Curve:
         """The curves of a model; of all but the baseline's dashpot, which is solved as such."""

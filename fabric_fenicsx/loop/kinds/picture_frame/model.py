@@ -27,7 +27,7 @@ from ...inference.effects import Effect, Variant
 from ...inference.experiment import OneCurve
 from ...measurement.schema import Measurement, Run
 from ..crosshead import CrossheadTest
-from ..records import last_run, one_point_before
+from ..records import last_run
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
 from .products import products
@@ -68,8 +68,8 @@ class PictureFrame(CrossheadTest):
 
     def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
         self._rig = {
-            "frame": Varying(np.array([[m.rig.frame_length_mm for m, _ in runs]])),
-            "fabric": Varying(np.array([[m.rig.fabric_length_mm for m, _ in runs]])),
+            "frame": self._recorded.each(np.array([m.rig.frame_length_mm for m, _ in runs])),
+            "fabric": self._recorded.each(np.array([m.rig.fabric_length_mm for m, _ in runs])),
         }
 
     @cached_property
@@ -158,8 +158,8 @@ class PictureFrame(CrossheadTest):
     @cached_property
     def _paths(self) -> Array:
         """Path of each run [rad], (n_runs,)."""
-        gamma = self._kinematics(self._points, {})["gamma"].value
-        return np.asarray(np.abs(np.diff(gamma, axis=0)).sum(axis=0))
+        records, gamma = self._recorded.records, self._kinematics(self._points, {})["gamma"].value
+        return records.so_far(np.abs(records.changes(gamma)))[records.ends]
 
     @cached_property
     def _past_of_specimens(self) -> dict[str, Array]:
@@ -170,7 +170,8 @@ class PictureFrame(CrossheadTest):
         readings = self.readings
         gamma = self._kinematics(self._points, {})["gamma"].value
         paths = self._paths
-        peaks = gamma[np.abs(gamma).argmax(axis=0), np.arange(gamma.shape[1])]
+        each = [gamma[self._recorded.records.of(run)] for run in range(len(paths))]
+        peaks = np.array([own[np.abs(own).argmax()] for own in each])
         specimen = readings.specimen[np.unique(readings.run, return_index=True)[1]]
         path, peak = np.zeros_like(paths), np.zeros_like(paths)
         for k, own in enumerate(specimen):
@@ -196,10 +197,9 @@ class PictureFrame(CrossheadTest):
             self._compiled["kinematics"] = marched.define(outputs, {})
         if travel is self._points and self._still is not None:
             return self._still
-        shape = travel["D"].value.shape
-        rig = {name: Varying(np.broadcast_to(v.value, shape)) for name, v in self._rig.items()}
-        known = dict(self._compiled["kinematics"]({**travel, **rig}, values))
-        known |= {"gamma_n": one_point_before(known["gamma"]), "per_time": self._points["per_time"]}
+        known = dict(self._compiled["kinematics"]({**travel, **self._rig}, values))
+        before = self._recorded.records.one_point_before(known["gamma"])
+        known |= {"gamma_n": before, "per_time": self._points["per_time"]}
         if travel is self._points:
             self._still = known
         return known

@@ -1,0 +1,34 @@
+"""Runs whose crossings go their own way, and those whose crossings go as in one of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from ..records import Records
+
+__all__ = ["GoingRuns"]
+
+Numbers = npt.NDArray[np.int64]
+
+
+class GoingRuns:
+    """Runs whose crossings go their own way; those of others go as they do in one of them.
+
+    Args:
+        records: of all runs.
+        goes_as: of each run the one that its crossings go as, with as many points, (n_runs,).
+
+    Attributes:
+        runs: those that go their own way, (n,).
+        points: theirs, among those of all, (n_points_of_crossings,).
+        records: where they stand among these.
+        at: of each point of all runs that of its crossings among these, (n_points,).
+    """
+
+    def __init__(self, records: Records, goes_as: Numbers) -> None:
+        self.runs = np.unique(goes_as)
+        self.points = np.flatnonzero(np.isin(records.run, self.runs))
+        self.records = Records(np.searchsorted(self.runs, records.run[self.points]))
+        begins = self.records.begins[np.searchsorted(self.runs, goes_as)]
+        self.at = np.arange(len(records.run)) + (begins - records.begins)[records.run]
