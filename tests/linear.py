@@ -72,6 +72,10 @@ class Linear:
         self.effects, self.noise = list(effects), noise
         self.terms = [e for e in effects if not e.listed]
 
+    @property
+    def of_fitted(self):
+        return self
+
     def predict(self, variants, values, deviations=NO_DEVIATIONS):
         names = [p.name for p in (*self.baseline, *(p for v in variants for p in v.parameters))]
         slopes = {

@@ -123,7 +123,7 @@ def test_what_strips_say_is_evaluated_once_and_the_same(strip, monkeypatch):
     assert strip._kinematics(strip._points, {}) is known
     ends = [of["gamma"].value[-1, -1] for of in (strip._kinematics(of_drawn, values), known)]
     assert ends[0] < ends[1]
-    anew = Travels(strip._points["D"].value, strip._parted)
+    anew = Travels(strip._points["D"].value, strip._recorded.records, strip._parted)
     monkeypatch.setattr(strip, "_recorded_travels", anew)
     strip._of_recorded.cache_clear()
     found, other_slopes = strip.predict((), values)

@@ -54,6 +54,10 @@ class Lines:
         scatter = {"a_N": tau, "b_N": tau} if tau else {}
         self.variances = Variances(Noise(SIGMA, 0.0, phi), scatter)
 
+    @property
+    def of_fitted(self):
+        return self
+
     def predict(self, variants, values, deviations=None):
         own = {p.name: np.ones_like(self.t) for p in self.baseline}
         for name, share in (deviations or {}).items():

@@ -10,6 +10,7 @@ from fabric_fenicsx.loop.diagnose import read_measurement
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 from fabric_fenicsx.loop.kinds.picture_frame.motion import crosshead_motion
 from fabric_fenicsx.loop.kinds.recorded_rig import RecordedRig
+from fabric_fenicsx.loop.kinds.records import laid_out
 
 HEAD = """\
 schema: fabric-measurement/1
@@ -40,7 +41,7 @@ def test_accelerations_are_of_second_order_to_the_ends(motion):
     for count in (101, 201, 401):
         t = np.linspace(0.0, 7.0, count)
         D, exact = motion(t)
-        rig = RecordedRig([crosshead_motion(t, D)], {})
+        rig = RecordedRig(*laid_out([crosshead_motion(t, D)]), {})
         found = rig.at_readings(rig.acceleration.value)
         off.append(np.abs(found - exact).max() / np.abs(exact).max())
     orders = np.log2(np.array(off[:-1]) / off[1:])
@@ -50,7 +51,7 @@ def test_accelerations_are_of_second_order_to_the_ends(motion):
 
 def test_what_goes_at_one_speed_has_no_acceleration():
     t = np.linspace(0.0, 10.0, 51)
-    rig = RecordedRig([crosshead_motion(t, 2.0 * t)], {})
+    rig = RecordedRig(*laid_out([crosshead_motion(t, 2.0 * t)]), {})
     np.testing.assert_allclose(rig.acceleration.value, 0.0, atol=1e-9)
 
 

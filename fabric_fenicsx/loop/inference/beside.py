@@ -45,7 +45,7 @@ def signed(
     Raises:
         SolveError: the model has no solution there.
     """
-    expected, slopes = experiment.predict(model.variants, model.values)
+    expected, slopes = experiment.of_fitted.predict(model.variants, model.values)
     own = set(model.values)
     found: dict[Effect, dict[Variant, list[Signature]]] = {
         effect: {v: [] for v in effect.variants if own.isdisjoint(p.name for p in v.parameters)}

@@ -195,6 +195,14 @@ class Experiment(Protocol):
         ...
 
     @property
+    def of_fitted(self) -> Experiment:
+        """The same test, to be asked of readings that are fitted alone.
+
+        What it predicts of those that are held out may be no number, where that takes less time.
+        """
+        ...
+
+    @property
     def effects(self) -> Sequence[Effect]:
         """The candidates, their starts and bounds fitted to the data."""
         ...

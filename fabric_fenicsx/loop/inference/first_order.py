@@ -50,7 +50,7 @@ class Signature:
 
     Attributes:
         at: values of all parameters.
-        expected: readings there, (n,).
+        expected: readings there, (n,), of those that are fitted.
         base: readings of the model without the effect, (n,).
         slopes: derivatives of ``expected``, (n,) each, by parameter of the fitted model and by
             amplitude of the effect.
@@ -93,7 +93,7 @@ def signatures(
     Args:
         experiment: the test.
         base: the fitted baseline.
-        alike: its expected readings with specimens that are alike, (n,).
+        alike: its expected readings with specimens that are alike, (n,), of ``of_fitted``.
         model: its derivatives, likewise, (n,) each.
         variant: the effect's form.
 
@@ -108,7 +108,7 @@ def signatures(
     for shape in dict.fromkeys(tuple(shape.items()) for shape in shapes):
         at = base.values | dict(shape)
         try:
-            expected, slopes = experiment.predict((*base.variants, variant), at)
+            expected, slopes = experiment.of_fitted.predict((*base.variants, variant), at)
         except SolveError:
             continue
         one = Signature(at, expected, alike, {name: slopes[name] for name in (*base.values, *own)})

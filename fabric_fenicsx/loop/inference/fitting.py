@@ -119,6 +119,9 @@ class _Model:
     ) -> None:
         self._experiment, self._variants, self._used = experiment, tuple(variants), used
         self._variances, self._readings = variances, experiment.readings
+        # Until the fit has ended nothing is asked of other readings.
+        held_out = (used & self._readings.holdout).any()
+        self._of_fitted = experiment if held_out else experiment.of_fitted
         self._parameters = parameters_of(experiment, variants)
         self._names = [p.name for p in self._parameters]
         groups = groups_of(experiment, variants)
@@ -128,7 +131,7 @@ class _Model:
         # All of one run, or of one specimen: the common parameters are its own.
         self._fitted = np.unique(self._readings.specimen[used])
         self._whiten = variances.noise.whitener(self._readings, used)
-        self._cache: dict[bytes, tuple[Array, dict[str, Array]]] = {}
+        self._cache: dict[tuple[Experiment, bytes], tuple[Array, dict[str, Array]]] = {}
 
     @property
     def bounds(self) -> tuple[Array, Array]:
@@ -152,7 +155,7 @@ class _Model:
     def residual(self, x: Array, raised: bool) -> Array:
         """White residuals and what specimens differ by; large where the model has no solution."""
         try:
-            expected = self._at(x)[0]
+            expected, _ = self._at(x, self._of_fitted)
         except SolveError:
             if raised:
                 raise
@@ -164,7 +167,8 @@ class _Model:
 
     def jacobian(self, x: Array) -> Array:
         """Of ``residual``."""
-        return self._with_prior(self._columns(x, self._fitted), len(self._fitted))
+        slopes = self._at(x, self._of_fitted)[1]
+        return self._with_prior(self._columns(x, slopes, self._fitted), len(self._fitted))
 
     def _with_prior(self, columns: Array, specimens: int) -> Array:
         """Columns of all readings, (n, k), as white rows of those fitted, and those of |δ/τ|²."""
@@ -174,9 +178,9 @@ class _Model:
 
     def fitted(self, x: Array, active: Array, converged: bool) -> Fit:
         """The fit that was found."""
-        expected, _ = self._at(x)
+        expected, by = self._at(x, self._experiment)
         everyone = np.arange(len(self._readings.specimens))
-        slopes = self._columns(x, everyone)
+        slopes = self._columns(x, by, everyone)
         J = self._with_prior(slopes, len(everyone))
         if not np.isfinite(J).all():
             raise SolveError(f"a derivative in {', '.join(self._names)} is not finite at the fit")
@@ -230,8 +234,8 @@ class _Model:
     def _over_scatter(self, x: Array) -> Array:
         return np.asarray(x[len(self._names) :] / self._scatters(len(self._fitted)))
 
-    def _at(self, x: Array) -> tuple[Array, dict[str, Array]]:
-        key = x.tobytes()
+    def _at(self, x: Array, test: Experiment) -> tuple[Array, dict[str, Array]]:
+        key = test, x.tobytes()
         if key not in self._cache:
             self._cache.clear()
             values = dict(zip(self._names, x[: len(self._names)].tolist(), strict=True))
@@ -240,7 +244,7 @@ class _Model:
                 for group, deviation in self._deviations(x).items()
                 for name in self._groups[group]
             }
-            found = self._experiment.predict(self._variants, values, deviations)
+            found = test.predict(self._variants, values, deviations)
             # Where an angle is at the end of its range the force is a number, its slope is none.
             if not all(
                 np.isfinite(one[self._used]).all() for one in (found[0], *found[1].values())
@@ -249,9 +253,10 @@ class _Model:
             self._cache[key] = found
         return self._cache[key]
 
-    def _columns(self, x: Array, specimens: npt.NDArray[np.int64]) -> Array:
+    def _columns(
+        self, x: Array, slopes: Mapping[str, Array], specimens: npt.NDArray[np.int64]
+    ) -> Array:
         """Derivatives in common parameters and in these specimens' deviations, (n, n_columns)."""
-        slopes = self._at(x)[1]
         columns = [slopes[name] for name in self._names]
         value = dict(zip(self._names, x, strict=False))
         for group, deviation in self._deviations(x).items():

@@ -170,7 +170,7 @@ def _damped(
         for p in (p for v in variants for p in v.amplitudes):
             at[p.name] = max(at[p.name], _least(p, at[p.name]))
         try:
-            expected, _ = experiment.predict(variants, at)
+            expected, _ = experiment.of_fitted.predict(variants, at)
         except SolveError:
             continue
         size = soft_size(whiten((experiment.readings.observed - expected)[base.used]), robust)
@@ -221,7 +221,7 @@ def around_jumps(experiment: Experiment, found: Fit, evaluations: int, robust: f
             for value in found.values[name] * shares:
                 at = found.values | {name: float(value)}
                 try:
-                    expected, slopes = experiment.predict(found.variants, at)
+                    expected, slopes = experiment.of_fitted.predict(found.variants, at)
                 except SolveError:
                     continue
                 rest = {n: slopes[n] for n in found.values if n != name}

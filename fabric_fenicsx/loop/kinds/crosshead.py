@@ -9,11 +9,12 @@ moment per area of fabric, from the virtual work F dD = Σ A m dγ,
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from math import inf
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -31,13 +32,14 @@ from .own_of_runs import OTHERS, Predicted, numbers_of_runs, to_own_numbers, wit
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
 from .recorded_rig import RecordedRig
-from .records import Records, runs_before, typical
+from .records import Records, laid_out, runs_before, typical
 from .slipping import Slips
 
 __all__ = ["CrossheadTest"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+Numbers = npt.NDArray[np.int64]
 
 #: Share of the largest size below which a reading on the other side of 0 is none.
 LITTLE = 0.05
@@ -76,18 +78,12 @@ class CrossheadTest:
         runs = [(m, run) for m in measurements for run in m.runs]
         motions = [self._motion(m, run) for m, run in runs]
         self._compiled: dict[Any, Marched] = {} if like is None else like._compiled
-        #: Angles and rates of a rig that follows the crosshead.
-        self._still: dict[str, Varying] | None = None
-        self._recorded = RecordedRig(motions, self._compiled)
-        self._slips = Slips(self._recorded.records)
-        self._points = self._recorded.points
-        self._moments = CrossingMoments(
-            self._compiled,
-            self._from_earlier_runs,
-            lambda: self._recorded.each(self._before["specimen"]),
-            lambda v, values: self._recorded.of_each(self._numbers_of_runs(v, values)),
-        )
-        self._set_up(runs)
+        #: Also of a copy that knows some runs alone; see of_fitted.
+        self._whole = self
+        self._count = len(runs)
+        recorded = RecordedRig(*laid_out(motions), self._compiled)
+        self._set_up(runs, recorded)
+        self._stand_on(recorded)
         known = self._kinematics(self._points, {})
         gamma, rate = (self._shown(known[key].value) for key in ("gamma", "rate"))
         time = self._recorded.at_readings(self._points["time"].value)
@@ -125,9 +121,32 @@ class CrossheadTest:
         """What the crosshead did in a run."""
         raise NotImplementedError
 
-    def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
-        """Keep what the kinematics need of the rig, before they are asked for."""
+    def _set_up(self, runs: Sequence[tuple[Measurement, Run]], recorded: RecordedRig) -> None:
+        """Keep what the kinematics need of the rig, run by run, before they are asked for."""
         raise NotImplementedError
+
+    def _stand_on(self, recorded: RecordedRig) -> None:
+        """Keep what goes by the points of records, of all runs or of some."""
+        self._recorded, self._points = recorded, recorded.points
+        #: Angles and rates of a rig that follows the crosshead.
+        self._still: dict[str, Varying] | None = None
+        self._slips = Slips(recorded.records)
+        self._moments = CrossingMoments(
+            self._compiled,
+            lambda v: self._from_earlier_runs(v, self._of_crossings.runs),
+            lambda: recorded.each(self._before["specimen"]),
+            lambda v, values: recorded.of_each(self._numbers_of_runs(v, values)),
+        )
+
+    @cached_property
+    def of_fitted(self) -> Self:
+        """The same test without the runs that are held out; see Experiment."""
+        fitted = np.unique(self.readings.run[self.readings.fit])
+        if len(fitted) in (0, self._count):
+            return self
+        found = copy(self)
+        found._stand_on(self._recorded.of_runs(fitted))
+        return found
 
     def _named(self, readings: Readings) -> Readings:
         """The readings with what else a rig knows of them."""
@@ -136,7 +155,7 @@ class CrossheadTest:
     @property
     def _on_the_load_cell(self) -> Array:
         """One for runs that a load cell reads, else zero, (n_runs,)."""
-        return np.ones(len(self._recorded.records.begins))
+        return np.ones(self._count)
 
     def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
         """An effect in the unit of the data."""
@@ -377,7 +396,8 @@ class CrossheadTest:
                 read += cell * self._acting(whole) * gain
             if v.each_run == "zero":
                 left = self.readings.observed - self._recorded.at_readings(read.value)
-                runs = np.flatnonzero(on_the_cell)
+                here = self._recorded.records.runs
+                runs = here[on_the_cell[here] > 0.0]
                 added, own_zeros = zeros_of(
                     self._recorded, v, values, left, self.readings, runs, self._compiled
                 )
@@ -475,12 +495,11 @@ class CrossheadTest:
 
     def _numbers_of_runs(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
         """What each run has of its own, (n_runs,); see numbers_of_runs."""
-        runs = len(self._recorded.records.begins)
         fitted = self.readings.run[self.readings.fit]
-        return numbers_of_runs(variant, values, runs, int(fitted.min()))
+        return numbers_of_runs(variant, values, self._count, int(fitted.min()))
 
-    def _from_earlier_runs(self, variant: FrameVariant) -> dict[str, Array]:
-        """What a form's law remembers where a run begins, by name; see Marched."""
+    def _from_earlier_runs(self, variant: FrameVariant, runs: Numbers) -> dict[str, Array]:
+        """What a form's law remembers where some runs begin, by name; see Marched."""
         return {}
 
     def _with_runs(self, effect: Effect) -> Effect:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cached_property, partial
 from typing import Any
 
@@ -11,14 +11,14 @@ import numpy.typing as npt
 
 from ...mechanics.scalars import derivative_of
 from ..expressions.marching import Marched, Varying, spread
-from .picture_frame.motion import Motion
 from .picture_frame.rig_variables import PER_SECOND
 from .picture_frame.variant import FrameVariant
-from .records import laid_out
+from .records import Records
 
 __all__ = ["RecordedRig"]
 
 Array = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.int64]
 
 #: What the crosshead itself tells at each point, and how fast that changes.
 OF_ITSELF = ("displacement", "time")
@@ -30,26 +30,47 @@ class RecordedRig:
     """What a rig did, point by point of its records; see records.laid_out.
 
     Args:
-        motions: of the runs.
+        points: by name, (n_points,) each.
+        records: where the runs stand.
+        readings: point of every reading, (n,); less than 0 where its run is not here.
         compiled: where expressions are kept.
 
     Attributes:
-        points: by name, (n_points,) each.
-        records: where the runs stand.
-        readings: point of every reading, (n,).
+        points, records, readings: these.
         before: how many runs of its folder were before each, (n_runs,).
         given: what else a rig knows at its points, by the names of FrameVariant.of.
     """
 
-    def __init__(self, motions: Sequence[Motion], compiled: dict[Any, Marched]) -> None:
-        self.points, self.records, self.readings = laid_out(motions)
+    def __init__(
+        self,
+        points: dict[str, Varying],
+        records: Records,
+        readings: Numbers,
+        compiled: dict[Any, Marched],
+    ) -> None:
+        self.points, self.records, self.readings = points, records, readings
         self._compiled = compiled
-        self.before = np.zeros(len(motions))
+        self.before = np.zeros(records.run[-1] + 1)
         self.given: dict[str, Varying] = {}
+        self._unknown = np.flatnonzero(readings < 0)
+
+    def of_runs(self, runs: Numbers) -> RecordedRig:
+        """The same of some runs alone."""
+        here = np.isin(self.records.run, runs)
+        points = {name: Varying(x.value[here]) for name, x in self.points.items()}
+        place = np.where(here, np.cumsum(here) - 1, -1)
+        records = Records(self.records.run[here])
+        found = RecordedRig(points, records, place[self.readings], self._compiled)
+        found.before = self.before
+        return found
 
     def at_readings(self, values: Array) -> Array:
-        """Of values at the points those at every reading, (n,)."""
-        return spread(values, self.records.run.shape)[self.readings]
+        """Of values at the points those at every reading, (n,); NaN where its run is not here."""
+        found = spread(values, self.records.run.shape)[self.readings]
+        if len(self._unknown):
+            found = found.astype(np.float64, copy=False)
+            found[self._unknown] = np.nan
+        return found
 
     def travel(self, variant: FrameVariant | None, values: Mapping[str, float]) -> Any:
         """True displacement of the frame, and its rate."""
@@ -124,7 +145,7 @@ class RecordedRig:
     def since_start(self) -> Varying:
         """Time in each run [s]."""
         time = self.points["time"].value
-        return Varying(time - time[self.records.begins][self.records.run])
+        return Varying(time - time[self.records.first])
 
     @cached_property
     def acceleration(self) -> Varying:
@@ -133,12 +154,12 @@ class RecordedRig:
         At both ends, where a run may have its largest acceleration, of the cubic that is nearest to
         the readings there. Between readings nobody knows how sharp a corner is.
         """
-        readings, run = self.readings, self.records.run
         time, D = (self.points[name].value for name in ("time", "D"))
         found = np.zeros(D.shape)
-        for k in range(len(self.records.begins)):
-            # Where a record stands still at first, readings may share a point.
-            own, whole = np.unique(readings[run[readings] == k]), self.records.of(k)
+        # Where a record stands still at first, readings may share a point.
+        read = np.unique(self.readings[self.readings >= 0])
+        for run in self.records.runs:
+            own, whole = read[self.records.run[read] == run], self.records.of(run)
             t = time[own]
             if len(own) > FEWEST:
                 bent = np.gradient(np.gradient(D[own], t), t)

@@ -46,10 +46,10 @@ BEFORE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Records:
-    """Where records stand that follow each other.
+    """Where the records of some runs stand, which follow each other.
 
     Attributes:
-        run: number of the record of each point, from 0, not falling, (n_points,).
+        run: number of the run of each point, not falling, (n_points,).
     """
 
     run: Numbers
@@ -58,6 +58,11 @@ class Records:
     def begins(self) -> Numbers:
         """The first point of each record, (n_records,)."""
         return np.flatnonzero(np.diff(self.run, prepend=-1))
+
+    @property
+    def runs(self) -> Numbers:
+        """The runs that there are, (n_records,)."""
+        return self.run[self.begins]
 
     @cached_property
     def ends(self) -> Numbers:
@@ -78,9 +83,15 @@ class Records:
         found[self.ends] = self.ends
         return found
 
+    @cached_property
+    def first(self) -> Numbers:
+        """The first point of the record that each one is of, (n_points,)."""
+        return np.repeat(self.begins, 1 + self.ends - self.begins)
+
     def of(self, run: int) -> slice:
-        """The points of a record."""
-        return slice(int(self.begins[run]), int(self.ends[run]) + 1)
+        """The points of a run."""
+        start, stop = np.searchsorted(self.run, [run, run + 1]).tolist()
+        return slice(start, stop)
 
     def one_point_before(self, x: Varying) -> Varying:
         """What something is at the point before; where a record begins what it is there."""
@@ -95,7 +106,7 @@ class Records:
     def so_far(self, values: Array) -> Array:
         """Sums from where each record begins, and without what is there."""
         sums = np.cumsum(values, axis=0)
-        return np.asarray(sums - sums[self.begins][self.run])
+        return np.asarray(sums - sums[self.first])
 
 
 def laid_out(motions: Sequence[Motion]) -> tuple[dict[str, Varying], Records, Numbers]:

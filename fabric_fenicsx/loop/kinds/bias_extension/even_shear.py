@@ -61,15 +61,14 @@ class EvenZones:
 
     Args:
         strips: of the runs; as for ``BiasStrip.areas``.
-        records: where these stand.
 
     Raises:
         ValueError: as there.
     """
 
-    def __init__(self, strips: Sequence[BiasStrip], records: Records) -> None:
-        self._strips, self._records = list(strips), records
-        self._free = np.array([strip.pull(np.zeros(1))[0] for strip in strips])[records.run]
+    def __init__(self, strips: Sequence[BiasStrip]) -> None:
+        self._strips = list(strips)
+        self._free = np.array([strip.pull(np.zeros(1))[0] for strip in strips])
         #: The last travel that was asked for, most often the recorded one, and its angle.
         self._last: tuple[Varying, tuple[Varying, Varying]] | None = None
         #: Of fabric [mm²], (n_runs, ZONES).
@@ -84,8 +83,8 @@ class EvenZones:
             D: the same [mm], (n_points,).
         """
         if self._last is None or self._last[0] is not D:
-            gamma = self._of_travel(D)
-            self._last = D, (gamma, self.lever(gamma))
+            gamma = self._of_travel(D, travels.records)
+            self._last = D, (gamma, self.lever(gamma, travels.records))
         pinned, lever = self._last[1]
         if len(parts) == 1:
             return pinned, lever
@@ -97,22 +96,24 @@ class EvenZones:
         change = _over(along + number(-1.0) * one * across, other, nothing=0.0)
         return pinned * one, lever * one + pinned * change
 
-    def lever(self, gamma: Varying) -> Varying:
+    def lever(self, gamma: Varying, records: Records) -> Varying:
         """dγ/dD [rad/mm] of strips that do not slip, at angles of zone A, (n_points,)."""
-        half = np.clip(gamma.value, -MOST, MOST) / 2.0
-        pull = self._free * (np.cos(half) - np.sin(half))
-        by_angle = self._free * (np.cos(half) + np.sin(half)) / (2.0 * pull**2)
+        half, free = np.clip(gamma.value, -MOST, MOST) / 2.0, self._free[records.run]
+        pull = free * (np.cos(half) - np.sin(half))
+        by_angle = free * (np.cos(half) + np.sin(half)) / (2.0 * pull**2)
         return Varying(1.0 / pull, {p: by_angle * slope for p, slope in gamma.slopes.items()})
 
-    def _of_travel(self, D: Varying) -> Varying:
+    def _of_travel(self, D: Varying, records: Records) -> Varying:
         """The formula's angle, (n_points,)."""
         gamma = np.concatenate(
             [
-                strip.angle(np.clip(D.value[self._records.of(run)], *_ends(strip)))
-                for run, strip in enumerate(self._strips)
+                self._strips[run].angle(
+                    np.clip(D.value[records.of(run)], *_ends(self._strips[run]))
+                )
+                for run in records.runs
             ]
         )
-        lever = self.lever(Varying(gamma)).value
+        lever = self.lever(Varying(gamma), records).value
         return Varying(gamma, {p: lever * slope for p, slope in D.slopes.items()})
 
 

@@ -51,15 +51,15 @@ def gone(
     along = own(D).slopes
     gamma = of_groups(parts, travels, "gamma", along)
     lever = of_groups(parts, travels, "lever", along)
-    area = np.stack([parts[0].solved.ways[run].area for run in going.runs])
+    area = np.stack([way.area for way in parts[0].solved.ways])
     factor = Varying(area[going.records.run]) * lever
     if even is not None:
         zone, zone_lever = even.angle(parts, travels, D)
         shares = Varying(SHARES)
         gamma = beside(gamma, own(zone) * shares)
         lever = beside(lever, own(zone_lever) * shares)
-        areas = Varying(SHARES * even.areas[going.runs][going.records.run])
-        factor = beside(factor, own(even.lever(zone)) * areas)
+        areas = Varying(SHARES * even.areas[going.records.run])
+        factor = beside(factor, own(even.lever(zone, travels.records)) * areas)
     return {
         "gamma": gamma,
         "gamma_n": going.records.one_point_before(gamma),

@@ -16,19 +16,23 @@ class GoingRuns:
     """Runs whose crossings go their own way; those of others go as they do in one of them.
 
     Args:
-        records: of all runs.
-        goes_as: of each run the one that its crossings go as, with as many points, (n_runs,).
+        records: of some runs.
+        goes_as: of each run the one that its crossings go as, with as many points, (n_runs,); if
+            that is not among them it goes its own way.
 
     Attributes:
         runs: those that go their own way, (n,).
         points: theirs, among those of all, (n_points_of_crossings,).
         records: where they stand among these.
-        at: of each point of all runs that of its crossings among these, (n_points,).
+        at: of each point that of its crossings among these, (n_points,).
     """
 
     def __init__(self, records: Records, goes_as: Numbers) -> None:
-        self.runs = np.unique(goes_as)
+        here, own = records.runs, goes_as[records.runs]
+        own = np.where(np.isin(own, here), own, here)
+        self.runs = np.unique(own)
         self.points = np.flatnonzero(np.isin(records.run, self.runs))
-        self.records = Records(np.searchsorted(self.runs, records.run[self.points]))
-        begins = self.records.begins[np.searchsorted(self.runs, goes_as)]
-        self.at = np.arange(len(records.run)) + (begins - records.begins)[records.run]
+        self.records = Records(records.run[self.points])
+        begins = self.records.begins[np.searchsorted(self.runs, own)]
+        further = np.repeat(begins - records.begins, 1 + records.ends - records.begins)
+        self.at = np.arange(len(records.run)) + further

@@ -49,10 +49,11 @@ class Part:
 
 
 class Travels:
-    """Travels of all runs, and what solved strips say there.
+    """Travels of some runs, and what solved strips say there.
 
     Args:
         D: travels [mm], (n_points,).
+        records: where the runs stand.
         parted: the points at which each run's crosshead does what; see phases.parted.
         going: runs whose crossings are wanted; by default all.
         kept: whether all that strips say is kept: of travels that are asked for again and again.
@@ -61,13 +62,14 @@ class Travels:
     def __init__(
         self,
         D: Array,
+        records: Records,
         parted: Parted,
         going: GoingRuns | None = None,
         *,
         kept: bool = False,
     ) -> None:
-        self._D, self._parted = D, parted
-        self._stops = any(one == Phase.STOPPED for own in parted for one, _ in own)
+        self._D, self.records, self._parted = D, records, parted
+        self._stops = any(one == Phase.STOPPED for own in parted.values() for one, _ in own)
         self._going = going
         most = min(KEPT, MOST_NUMBERS // max(D.size * GROUPS, 1)) if kept else FEW
         self._known: Kept[Array] = Kept(most)
@@ -104,7 +106,7 @@ class Travels:
         count = len(self._D) if going is None else len(going.points)
         pieces = np.empty((4, count, *([GROUPS] if of_groups else [])))
         s = np.empty((count, *([1] if of_groups else [])))
-        for r in range(len(solved.ways)) if going is None else going.runs:
+        for r in self._parted if going is None else going.runs.tolist():
             for one, points in self._parted[r]:
                 own, on = solved.ways[r].cubics(name, one, self._D[points])
                 at = points if going is None else going.at[points]
@@ -142,10 +144,10 @@ class Holds:
 
     def _left(self, solved: Solved, name: Literal["force", "middle"]) -> Array:
         found = np.zeros(self._since.shape)
-        for r, way in enumerate(solved.ways):
-            if way.hold is not None:
-                mine = self._records.of(r)
-                found[mine] = way.hold.at(name, self._since[mine])
+        for r in self._records.runs:
+            hold, mine = solved.ways[r].hold, self._records.of(r)
+            if hold is not None:
+                found[mine] = hold.at(name, self._since[mine])
         found.flags.writeable = False
         return found
 

@@ -33,6 +33,7 @@ from ..crosshead import CrossheadTest
 from ..picture_frame.model import SAME_RATE
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
+from ..recorded_rig import RecordedRig
 from ..records import Records
 from .curves import KNOTS, Curve, Moment, at_knots
 from .effects import BIAS_EXTENSION_EFFECTS, StripPullVariant
@@ -204,31 +205,22 @@ class BiasExtension(CrossheadTest):
             certain=found.certain[rows],
         )
 
-    def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
-        records = self._recorded.records
-        D, time, speed = (self._points[name].value for name in ("D", "time", "D_rate"))
-        self._runs = list(runs)
-        pulls = pulls_of(runs, self._parent, D, time, speed, records, self._recorded.readings)
+    def _set_up(self, runs: Sequence[tuple[Measurement, Run]], recorded: RecordedRig) -> None:
+        records = recorded.records
+        D, time, speed = (recorded.points[name].value for name in ("D", "time", "D_rate"))
+        self._runs, self._run = list(runs), records.run
+        pulls = pulls_of(runs, self._parent, D, time, speed, records, recorded.readings)
         self._furthest, self._goes_back = pulls.furthest, pulls.goes_back
-        self._phase, self._holds = pulls.phase, Holds(pulls.since, records)
+        self._phases, self._since = pulls.phase, pulls.since
         # An angle is read of a strip whose force is, mostly at the same places: its crossings go
         # as they do in that run.
         moved = [np.stack([D, time, speed])[:, records.of(run)] for run in range(len(runs))]
-        goes_as = np.array(
+        self._goes_as = np.array(
             [
                 force if np.array_equal(moved[force], moved[run]) else run
                 for run, force in enumerate(self._parent)
             ]
         )
-        self._going = GoingRuns(records, goes_as)
-        self._parted = parted(self._phase, records)
-        self._recorded_travels = Travels(D, self._parted, self._going, kept=True)
-
-        def going(solved: Solved) -> dict[str, Varying]:
-            parts = [Part(solved, number(1.0))]
-            return self._gone(parts, self._points["D"], self._points["D_rate"])
-
-        self._of_recorded = lru_cache(maxsize=MOTIONS)(going)
         for (m, run), travel, pace in zip(runs, pulls.furthest, pulls.speed, strict=True):
             strip_case(m, run, float(travel), float(pace), {})
         self._even = self._even_zones(runs)
@@ -252,14 +244,32 @@ class BiasExtension(CrossheadTest):
             for way, D in zip(first.ways, self._furthest, strict=True)
         ]
         self._mixture = [Part(first, number(1.0))]
-        length, width = np.array([(s.length, s.width) for s in (strip_of(*one) for one in runs)]).T
-        self._recorded.given = {
-            "width": self._recorded.each(width),
-            "free_length": self._recorded.each(length - width),
-            "pinned_angle": Varying(self._recorded_travels.of(first, "middle")),
-        }
         out = WaysOut(self._furthest, self._typical_rate, self._top, bool(self._goes_back.any()))
         self._models = StripModels(self._strips, first, out, self._moment_of)
+        self._pinned = first
+
+    def _stand_on(self, recorded: RecordedRig) -> None:
+        super()._stand_on(recorded)
+        records, here = recorded.records, np.isin(self._run, recorded.records.runs)
+        D = self._points["D"].value
+        self._phase, self._holds = self._phases[here], Holds(self._since[here], records)
+        self._going = GoingRuns(records, self._goes_as)
+        self._parted = parted(self._phase, records)
+        self._recorded_travels = Travels(D, records, self._parted, self._going, kept=True)
+
+        def going(solved: Solved) -> dict[str, Varying]:
+            parts = [Part(solved, number(1.0))]
+            return self._gone(parts, self._points["D"], self._points["D_rate"])
+
+        self._of_recorded = lru_cache(maxsize=MOTIONS)(going)
+        length, width = np.array(
+            [(s.length, s.width) for s in (strip_of(*one) for one in self._runs)]
+        ).T
+        recorded.given = {
+            "width": recorded.each(width),
+            "free_length": recorded.each(length - width),
+            "pinned_angle": Varying(self._recorded_travels.of(self._pinned, "middle")),
+        }
 
     def _half_way(self, speed: Array) -> float:
         """A rate [rad/s] of the middle, half-way out at the runs' speeds [mm/s].
@@ -284,7 +294,7 @@ class BiasExtension(CrossheadTest):
         if not (self.may_be_even and (fitted & (self._angles | self._goes_back)).any()):
             return None
         try:
-            return EvenZones([strip_of(m, run) for m, run in runs], self._recorded.records)
+            return EvenZones([strip_of(m, run) for m, run in runs])
         except ValueError:
             return None
 
@@ -353,7 +363,8 @@ class BiasExtension(CrossheadTest):
         if self._models.settle(variants, values):
             self._mixture = self._mixed(variants, values)
             # What slipped was by the force as it was foretold before.
-            self._slips.clear()
+            for test in (self, self.of_fitted):
+                test._slips.clear()
 
     def _mixed(self, variants: Sequence[Variant], values: Mapping[str, float]) -> list[Part]:
         """What is known of the strips of a model."""
@@ -388,7 +399,7 @@ class BiasExtension(CrossheadTest):
         """Travels of a model; most have those of the crossheads."""
         if D is self._points["D"]:
             return self._recorded_travels
-        return Travels(D.value, self._parted, self._going)
+        return Travels(D.value, self._recorded.records, self._parted, self._going)
 
     def _kinematics(self, travel: Any, values: Mapping[str, float]) -> dict[str, Varying]:
         D, speed = travel["D"], travel["D_rate"]

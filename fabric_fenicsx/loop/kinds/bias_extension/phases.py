@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 
 import numpy as np
@@ -45,8 +45,8 @@ class Phase(IntEnum):
     OUT, BACK, STOPPED = range(3)
 
 
-Parted = Sequence[Sequence[tuple[Phase, npt.NDArray[np.int64]]]]
-"""Of each run what its crosshead does, and the numbers of the points where it does."""
+Parted = Mapping[int, Sequence[tuple[Phase, npt.NDArray[np.int64]]]]
+"""Of some runs, by number, what its crosshead does, and the points where it does."""
 
 
 def parted(phases: Phases, records: Records) -> Parted:
@@ -56,13 +56,13 @@ def parted(phases: Phases, records: Records) -> Parted:
         phases: (n_points,).
         records: where the runs stand.
     """
-    return [
-        [
+    return {
+        run: [
             (Phase(one), np.flatnonzero((records.run == run) & (phases == one)))
             for one in np.unique(phases[records.of(run)])
         ]
-        for run in range(len(records.begins))
-    ]
+        for run in records.runs.tolist()
+    }
 
 
 def moving(speed: Array) -> Array:

@@ -49,9 +49,9 @@ class Correction:
         def found(order: int) -> Array:
             lines = getattr(self, quantity)
             total = np.zeros(D.value.shape)
-            for run, furthest in enumerate(self.furthest):
-                for one, points in parted[run]:
-                    at = np.clip(D.value[points], 0.0, furthest)
+            for run, ways in parted.items():
+                for one, points in ways:
+                    at = np.clip(D.value[points], 0.0, self.furthest[run])
                     total[points] = lines[one][run](at, order)
             return total
 
@@ -77,7 +77,7 @@ def correction(exact: Solved, foretold: Sequence[Part], furthest: Array) -> Corr
     off: dict[str, list[list[PchipInterpolator]]] = {"force": [], "middle": []}
     for one in Phase:
         phase = np.full(D.shape, one, dtype=np.int8)
-        travels = Travels(D.ravel(), parted(phase.ravel(), records))
+        travels = Travels(D.ravel(), records, parted(phase.ravel(), records))
         gamma, lever = (
             of_groups(foretold, travels, name).value.reshape(*D.shape, -1)
             for name in ("gamma", "lever")

@@ -27,6 +27,7 @@ from ...inference.effects import Effect, Variant
 from ...inference.experiment import OneCurve
 from ...measurement.schema import Measurement, Run
 from ..crosshead import CrossheadTest
+from ..recorded_rig import RecordedRig
 from ..records import last_run
 from .effects import PICTURE_FRAME_EFFECTS
 from .motion import Motion, frame_motion
@@ -39,6 +40,7 @@ from .variant import FrameVariant
 __all__ = ["PictureFrame"]
 
 Array = npt.NDArray[np.float64]
+Numbers = npt.NDArray[np.int64]
 
 #: Share by which speeds may differ that are one.
 SAME_RATE = 0.1
@@ -66,11 +68,15 @@ class PictureFrame(CrossheadTest):
             measurement.rig.frame_length_mm,
         )
 
-    def _set_up(self, runs: Sequence[tuple[Measurement, Run]]) -> None:
-        self._rig = {
-            "frame": self._recorded.each(np.array([m.rig.frame_length_mm for m, _ in runs])),
-            "fabric": self._recorded.each(np.array([m.rig.fabric_length_mm for m, _ in runs])),
+    def _set_up(self, runs: Sequence[tuple[Measurement, Run]], recorded: RecordedRig) -> None:
+        self._lengths = {
+            "frame": np.array([m.rig.frame_length_mm for m, _ in runs]),
+            "fabric": np.array([m.rig.fabric_length_mm for m, _ in runs]),
         }
+
+    def _stand_on(self, recorded: RecordedRig) -> None:
+        super()._stand_on(recorded)
+        self._rig = {name: recorded.each(lengths) for name, lengths in self._lengths.items()}
 
     @cached_property
     def curves_only(self) -> bool:
@@ -147,13 +153,14 @@ class PictureFrame(CrossheadTest):
         own = mine if variant.laws is not None else mine[:1]
         return not any(v.of_the_force for v in own)
 
-    def _from_earlier_runs(self, variant: FrameVariant) -> dict[str, Array]:
+    def _from_earlier_runs(self, variant: FrameVariant, runs: Numbers) -> dict[str, Array]:
         if not variant.carried:
             return {}
-        known = self._past_of_specimens
+        assert isinstance(self._whole, PictureFrame)
+        known = self._whole._past_of_specimens
         named = {"variable": variant.carried, "largest": "largest_angle", "side": "side"}
         # The one law of the form counts from 0.
-        return {f"0 {name}": known[of] for name, of in named.items()}
+        return {f"0 {name}": known[of][runs] for name, of in named.items()}
 
     @cached_property
     def _paths(self) -> Array:
