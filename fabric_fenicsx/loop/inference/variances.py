@@ -53,6 +53,8 @@ RESTARTS = 20
 TRIED = 21
 #: Largest correlation of neighbours; of a single run slower noise is not told from a misfit.
 MOST_CORRELATED, OF_ONE_RUN = 0.9, 0.5
+#: Floor over a typical sigma below which it may as well be as large as that.
+LOW_FLOOR = 0.25
 #: Correlation beyond which noise may as well be a smooth line that is missed.
 SLOW = 0.5
 
@@ -187,7 +189,7 @@ def estimate(
     found = likeliest(x0)
     noise = problem.split(found)[0]
     typical = noise.typical(at.readings, at.rows)
-    if noise.floor < typical / np.sqrt(2.0):
+    if noise.floor < LOW_FLOOR * typical:
         # A floor of next to nothing can be likeliest among its neighbours alone.
         even = found.copy()
         even[0], even[2] = np.log(typical / problem.floor), 0.0

@@ -10,10 +10,14 @@ by way of those in G. Smooth lines L, which are many, are the same over σ whate
     Lᵀ T L = Σ_b (E_b + φ²ᵇ F_b − φᵇ X_b) / (1 − φ²ᵇ)
 
 with sums over the readings that are b places from the one before, once for all: of the products of
-their own values, of those of the ones before them, and of the two with each other, both ways.
+their own values, of those of the ones before them, and of the two with each other, both ways. Of
+the other columns many are nothing but in the readings of one specimen, and lines but in those of
+one run: products are taken part by part, over those that are something there.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +29,29 @@ __all__ = ["Columns", "White"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+Numbers = npt.NDArray[np.int64]
+
+#: Products of two numbers that take less time than a part of their own.
+LITTLE = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """Readings that go together with none of the others, one after the other.
+
+    Attributes:
+        rows: which they are.
+        lines: those lines that are something there, (n, l).
+        weighted: likewise of the other columns, times the readings' weights, (n, m).
+        of_others, of_both: places of the products of these with each other, and with the lines,
+            among those of all columns.
+    """
+
+    rows: slice
+    lines: Array
+    weighted: Array
+    of_others: tuple[Numbers, ...]
+    of_both: tuple[Numbers, ...]
 
 
 class Columns:
@@ -40,9 +67,9 @@ class Columns:
         reading: y of noise's formula, (n,).
         weight: of each reading, (n,).
         back: places from the reading before, see ``noise.steps_back``.
-        lines: L, as they are, (n, l).
-        weighted: the other columns times the readings' weights, (n, m - l).
-        among, others: places of the lines and of these among the columns.
+        parts: of all readings.
+        among: places of the lines among the columns, and of products of these.
+        count: of all columns.
         steps: b of the module's docstring, those that there are.
         sums: E, F and X of each, (l, l).
     """
@@ -50,10 +77,25 @@ class Columns:
     def __init__(self, readings: Readings, rows: Flags, columns: Array, lines: slice) -> None:
         self.reading, self.weight = readings.observed[rows], readings.weight[rows]
         self.back = steps_back(readings, rows)
-        every = np.arange(columns.shape[1])
-        self.among, self.others = every[lines], np.delete(every, lines)
-        self.lines = L = columns[:, lines]
-        self.weighted = columns[:, self.others] * self.weight[:, None]
+        self.count = columns.shape[1]
+        every = np.arange(self.count)
+        among, others = every[lines], np.delete(every, lines)
+        self.among = np.ix_(among, among)
+        self.parts = []
+        there = columns != 0.0
+        for part in _parts(self.back, there):
+            something = there[part].any(axis=0)
+            its_lines, its_own = among[something[among]], others[something[others]]
+            self.parts.append(
+                _Part(
+                    rows=part,
+                    lines=columns[part, its_lines],
+                    weighted=columns[part, its_own] * self.weight[part, None],
+                    of_others=np.ix_(its_own, its_own),
+                    of_both=np.ix_(its_own, its_lines),
+                )
+            )
+        L = columns[:, lines]
         self.steps = np.unique(self.back) if L.shape[1] else np.zeros(0, dtype=int)
         self.sums = []
         for step in self.steps:
@@ -62,6 +104,20 @@ class Columns:
             before = L[np.maximum(own - 1, 0)]
             mixed = L[own].T @ before
             self.sums.append((L[own].T @ L[own], before.T @ before, mixed + mixed.T))
+
+
+def _parts(back: Numbers, there: Flags) -> list[slice]:
+    """Readings in a row that go together with none of the others, if that saves products.
+
+    Args:
+        back: places from each to the reading before it, 0 if it goes together with none.
+        there: where columns are something, (n, m).
+    """
+    begins = np.flatnonzero(back == 0)
+    whole = slice(0, len(back))
+    if len(back) * there.shape[1] ** 2 < LITTLE * len(begins):
+        return [whole]
+    return [slice(*ends) for ends in zip(begins, [*begins[1:], len(back)], strict=True)]
 
 
 class White:
@@ -86,23 +142,26 @@ class White:
         square = 1.0 + (share * of.reading) ** 2
         self._along = np.where(of.back > 0, correlation**of.back, 0.0)
         self._over = 1.0 / (1.0 - self._along**2)
-        self._plain = P = of.weighted / np.sqrt(square)[:, None]
         # T on its diagonal, and beside it but for the sign.
         self._own = self._over.copy()
         self._own[:-1] += (self._along**2 * self._over)[1:]
         self._beside = (self._along * self._over)[1:]
-        turned = self._own[:, None] * P
-        if self._beside.any():
-            turned[1:] -= self._beside[:, None] * P[:-1]
-            turned[:-1] -= self._beside[:, None] * P[1:]
-        count = len(of.among) + len(of.others)
-        self.products = G = np.empty((count, count))
-        G[np.ix_(of.others, of.others)] = turned.T @ P
-        if len(of.among):
-            with_lines = turned.T @ of.lines
-            G[np.ix_(of.others, of.among)] = with_lines
-            G[np.ix_(of.among, of.others)] = with_lines.T
-            G[np.ix_(of.among, of.among)] = self._of_lines()
+        root = np.sqrt(square)[:, None]
+        self.products = G = np.zeros((of.count, of.count))
+        G[of.among] = self._of_lines()
+        self._plain = []
+        for part in of.parts:
+            P = part.weighted / root[part.rows]
+            turned = self._own[part.rows, None] * P
+            beside = self._beside[part.rows][: len(P) - 1, None]
+            if beside.any():
+                turned[1:] -= beside * P[:-1]
+                turned[:-1] -= beside * P[1:]
+            G[part.of_others] += turned.T @ P
+            G[part.of_both] += turned.T @ part.lines
+            self._plain.append(P)
+        lines = of.among[1][0]
+        G[lines] = G[:, lines].T
         self.determinant = float(np.sum(np.log(square / of.weight**2)) - np.sum(np.log(self._over)))
         self.ratio = float(np.sqrt(np.mean(square)))
         self.ratio_slope = float(np.mean(of.reading**2) / (2.0 * np.mean(square)))
@@ -110,7 +169,8 @@ class White:
 
     def _of_lines(self) -> Array:
         """Lᵀ T L, (l, l)."""
-        found = np.zeros((len(self._of.among), len(self._of.among)))
+        count = len(self._of.among[0])
+        found = np.zeros((count, count))
         for step, (E, F, X) in zip(self._of.steps, self._of.sums, strict=True):
             a = self.correlation**step if step > 0 else 0.0
             found += (E + a**2 * F - a * X) / (1.0 - a**2)
@@ -118,15 +178,18 @@ class White:
 
     def slopes(self, by: Array) -> tuple[float, float]:
         """Derivatives of Σ by G, symmetric, and of the determinant in κ² and in φ."""
-        of, along, over, P = self._of, self._along[1:], self._over[1:], self._plain
-        Q = P @ by[np.ix_(of.others, of.others)]
-        own, before = _row_by_row(Q, P), _row_by_row(Q[1:], P[:-1])
+        of, along, over = self._of, self._along[1:], self._over[1:]
         # Lines have a row with the other columns, one with these before it, and after it.
-        with_lines, with_before, with_after = (np.zeros(len(P) - k) for k in (0, 1, 1))
-        if len(of.among):
-            W = of.lines @ by[np.ix_(of.among, of.others)]
-            with_lines = _row_by_row(W, P)
-            with_before, with_after = _row_by_row(W[1:], P[:-1]), _row_by_row(W[:-1], P[1:])
+        own, with_lines = np.zeros((2, len(of.back)))
+        before, with_before, with_after = np.zeros((3, len(of.back) - 1))
+        for part, P in zip(of.parts, self._plain, strict=True):
+            rows, pairs = part.rows, slice(part.rows.start, part.rows.stop - 1)
+            Q, W = P @ by[part.of_others], part.lines @ by[part.of_both].T
+            own[rows], before[pairs] = _row_by_row(Q, P), _row_by_row(Q[1:], P[:-1])
+            if W.shape[1] and part.lines.shape[1]:
+                with_lines[rows] = _row_by_row(W, P)
+                with_before[pairs] = _row_by_row(W[1:], P[:-1])
+                with_after[pairs] = _row_by_row(W[:-1], P[1:])
         every, beside = own + 2.0 * with_lines, before + with_before + with_after
         of_along = 2.0 * along * (every[1:] + every[:-1]) - 2.0 * (1.0 + along**2) * beside
         of_along = over**2 * of_along - 2.0 * along * over
@@ -134,7 +197,7 @@ class White:
         by_correlation = np.where(of.back[1:] > 0, back * self.correlation ** (back - 1), 0.0)
         of_correlation = float(of_along @ by_correlation)
         # The same of the lines by their sums.
-        of_lines = by[np.ix_(of.among, of.among)]
+        of_lines = by[of.among]
         for step, (E, F, X) in zip(of.steps, of.sums, strict=True):
             if step > 0:
                 a = self.correlation**step
