@@ -38,7 +38,7 @@ def chosen_model(
         by = CRITERIA.strong if unlike else CRITERIA.decisive
         beaten = min(more, default=float("inf")) < level[0].criterion - by
         # What is left may be due to the form of an effect rather than to another one.
-        doubtful = unlike or (terms and judge.doubtful_noise(level[0])) or judge.unsaid(level[0])
+        doubtful = unlike or (terms and judge.may_hide_another(level[0])) or judge.unsaid(level[0])
         doubtful |= bool(count) and beaten and may_be_one_more(level[0])
         # Nor is a term over two variables simpler than two.
         doubtful |= level[0].over_two

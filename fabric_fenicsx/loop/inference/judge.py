@@ -234,6 +234,14 @@ class Judge:
             return model.estimate.variances.noise.correlation > slow
         return self.misfit(model).reading > CRITERIA.scatter * self.given
 
+    def may_hide_another(self, model: Model) -> bool:
+        """Whether an effect may hide in what a model of terms takes for noise or for specimens.
+
+        Where noise is more than was stated, beyond chance, or slow; or specimens differ unusually.
+        """
+        more = self.misfit(model).whiteness.size < CRITERIA.structure_p
+        return more or self.doubtful_noise(model) or self.unlike(model.fit)
+
     def unsaid(self, model: Model) -> bool:
         """Whether a misfit passes for noise, and there is no term without a formula to tell why.
 

@@ -76,7 +76,7 @@ class Search:
         self.chosen: Model | None = None
         #: Whether noise is more than was stated for that, or slow.
         self.doubtful_noise = False
-        #: Whether specimens differ in it, and may do so by a further effect.
+        #: Whether specimens differ in it; and whether a further effect may be in that, or in noise.
         self.specimens_differ = self.may_be_more = False
         #: Models of one effect, the best first.
         self.singles: Sequence[Model] = ()
@@ -116,6 +116,8 @@ class Search:
         self.doubtful_noise = self.judge.doubtful_noise(chosen)
         self.specimens_differ = bool(chosen.fit.deviations)
         self.may_be_more = chosen.over_two or self.may_be_one_more(chosen)
+        if self._screened_first:
+            self.may_be_more |= self.judge.may_hide_another(chosen)
         nearest = _nearest(levels)
         # Held-out runs, by which it may be contradicted, do not say whether to look further.
         self.chosen = final if final.effects else chosen
@@ -324,13 +326,13 @@ class Search:
     def _settled(self, model: Model, baseline: Model) -> bool:
         """Whether nothing more is looked for.
 
-        Of terms only where their noise is not in doubt. And where specimens differ unusually, or
-        each was tested in a way of its own, what they differ by may be a further effect.
+        Of terms only where nothing may hide in noise. And where specimens differ unusually, or each
+        was tested in a way of its own, what they differ by may be a further effect.
         """
         if not self.judge.settled(model, baseline) or self.may_be_one_more(model):
             return False
         if self._screened_first:
-            return not self.judge.doubtful_noise(model)
+            return not self.judge.may_hide_another(model)
         if model.effects and self.judge.unlike(model.fit):
             return False
         differ = self.experiment.each_its_own_way and bool(model.effects and model.fit.deviations)

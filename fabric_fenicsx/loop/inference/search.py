@@ -56,7 +56,7 @@ def diagnose_test(
     if found.curve is not None:
         return found
     if search.gave_way and further.found is not None:
-        if further.may_be_more or further.doubtful_noise:
+        if further.may_be_more:
             further.most = None
             further.run()
         return _beside(further.found, found)
@@ -199,7 +199,7 @@ def _in_their_place(search: Search, further: Search, single: Search, gain: float
 def _or_several(single: Search, further: Search, criterion: float) -> Diagnosis:
     """What a search for one term has found; or several, if it may not be all and they do better."""
     assert single.found is not None
-    if single.doubtful_noise or single.may_be_more:
+    if single.may_be_more:
         several = _several(further, criterion)
         if several is not None:
             return several
