@@ -113,6 +113,20 @@ def test_noise_beyond_what_was_stated():
     assert not judge.doubtful_noise(model)
 
 
+def test_an_effect_may_hide_in_noise_beyond_chance_or_in_specimens_that_differ_much():
+    """Noise that nobody stated, and specimens that differ as they do, are no such doubt."""
+    for scatter, more in ((SIGMA, False), (1.5 * SIGMA, True)):
+        judge, model = judged(scatter=scatter)
+        assert judge.may_hide_another(model) is more
+        if not more:
+            for tau, much in ((0.15, False), (0.3, True)):
+                variances = Variances(Noise(SIGMA), {"a": tau, "b": 0.0})
+                apart = replace(model, fit=replace(model.fit, variances=variances))
+                assert judge.may_hide_another(apart) is much
+    judge, model = judged(stated=None, scatter=1.5 * SIGMA)
+    assert not judge.may_hide_another(model)
+
+
 def test_noise_of_far_more_than_was_stated_accounts_for_nothing():
     for scatter, much in ((2.0 * SIGMA, False), (3.0 * SIGMA, True)):
         judge, model = judged(scatter=scatter)

@@ -413,6 +413,23 @@ def test_a_term_that_leaves_doubtful_noise_is_not_all(monkeypatch, doubtful):
     assert all(set(test.terms) <= set(effects) for effects in together)
 
 
+@pytest.mark.parametrize(("much", "found"), [(0.0, {"kink"}), (0.015, {"kink", "hum"})])
+def test_a_term_that_leaves_a_little_more_than_was_stated_is_not_all(much, found):
+    """By an eighth: less than a noise may be misstated by, and more than it is by chance."""
+    columns = {
+        "kink": lambda t: np.where(t > 0.5, np.sin(40.0 * t), 0.0),
+        "hum": lambda t: np.cos(90.0 * t),
+    }
+    test = made(columns, lambda t: columns["kink"](t) + much * columns["hum"](t), [])
+    test.terms = [linear_effect(n, acts_on="reading") for n in columns]
+    test.noise = 0.02
+    single = Search(test, test.terms, lambda done, what: None, most=1)
+    single.run()
+    assert single.accounted and not single.doubtful_noise
+    assert single.may_be_more is (much > 0.0)
+    assert {e.name for e in diagnose_test(test).effects} == found
+
+
 def test_more_is_added_to_the_next_term_of_one_variable_as_well():
     effects = [
         replace(linear_effect(name), of_two=name == "product")
