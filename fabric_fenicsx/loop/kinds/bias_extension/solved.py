@@ -8,6 +8,7 @@ where none is near. All that has to be solved for one model is solved at once, i
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -59,7 +60,8 @@ class Solved:
         curve: of their crossings.
         ways: of each run.
         by_moments: A dγ/dD of all groups at some travels of all runs, out and back, times what
-            each moment at KNOTS counts for there, straight between them, (n, n_knots).
+            each moment at KNOTS counts for there, straight between them, (n, n_knots); of runs
+            that go the same way once, so many times that.
         by_dashpot: A dγ/dD dγ/dt there, (n,).
         out: how many of them are on the way out; the others are on the way back.
     """
@@ -73,15 +75,19 @@ class Solved:
     @classmethod
     def along(cls, curve: Curve, ways: Sequence[Way], furthest: Array) -> Solved:
         """The same, from the travels that the strips went to [mm], (n_runs,)."""
-        every = [(w, np.linspace(0.0, D, TRAVELS)) for w, D in zip(ways, furthest, strict=True)]
-        every += [(w.back, D) for w, D in every if w.back is not None]
+        most = dict(zip(ways, furthest, strict=True))
+        each = [(way, np.linspace(0.0, D, TRAVELS)) for way, D in most.items()]
+        every = [*each, *((way.back, D) for way, D in each if way.back is not None)]
         passed = np.concatenate([way.gamma(D).ravel() for way, D in every])
         weight, rate = (
             np.concatenate([(by(way) * way.gamma(D, 1)).ravel() for way, D in every])
             for by in (attrgetter("area"), attrgetter("speed"))
         )
+        times = [Counter(ways)[way] for way, _ in each]
+        times += [n for n, (way, _) in zip(times, each, strict=True) if way.back is not None]
+        weight *= np.repeat(times, TRAVELS * GROUPS)
         by_moments = (np.sign(passed) * weight * _straight_between_knots(np.abs(passed))).T
-        out = TRAVELS * GROUPS * len(ways)
+        out = TRAVELS * GROUPS * len(each)
         return cls(curve, tuple(ways), by_moments, weight * rate, out)
 
     def apart(self, curve: Curve) -> float:
@@ -287,14 +293,18 @@ class SolvedStrips:
         self, curve: Curve, paths: Sequence[StripPath | Exception]
     ) -> Solved | SolveError:
         """A set of the paths of its strips, their crossings in groups."""
-        whole: list[StripPath] = []
-        for path in paths:
+        made: dict[tuple[int, bytes], Way] = {}
+        ways = []
+        for run, path in enumerate(paths):
             if isinstance(path, SolveError):
                 return path
             if isinstance(path, Exception):
                 raise path
-            whole.append(path)
-        ways = [way_of(path, self._of_alike(r, path), curve) for r, path in enumerate(whole)]
+            groups = self._of_alike(run, path)
+            key = id(path), groups.tobytes()
+            if key not in made:
+                made[key] = way_of(path, groups, curve)
+            ways.append(made[key])
         return Solved.along(curve, ways, self._pulls.furthest)
 
     def _of_alike(self, run: int, path: StripPath) -> npt.NDArray[np.int64]:
