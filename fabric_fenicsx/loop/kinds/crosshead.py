@@ -21,7 +21,7 @@ import numpy.typing as npt
 from scipy.optimize import nnls
 
 from ...inputs.parameters import Parameter
-from ..expressions.marching import Marched, Varying, spread
+from ..expressions.marching import Marched, Varying
 from ..inference.effects import Effect, Variant, of_each, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ..inference.noise import estimated_noise
@@ -177,9 +177,9 @@ class CrossheadTest:
         """The force on the rig, where another quantity may be read instead of it."""
         return force
 
-    def _gathered(self, values: Array) -> Array:
-        """Sums over the crossings of each run, (n_points,)."""
-        return values
+    def _summed(self, moment: Array, factor: Array) -> Array:
+        """Moments times what they are weighed by, summed over a run's crossings, (n_points,)."""
+        return np.asarray(moment * factor)
 
     def _shown(self, values: Array) -> Array:
         """Of the crossings of a run the one that is shown, at every reading, (n,)."""
@@ -208,7 +208,7 @@ class CrossheadTest:
         noise = self.noise or estimated_noise(residual, self.readings, rows)
         known = self._kinematics(self._points, {})
         per_speed = self._recorded.at_readings(
-            self._gathered(known["factor"].value * known["rate_per_speed"].value)
+            self._summed(known["rate_per_speed"].value, known["factor"].value)
         )
         # Where nothing is known of the rate the motion has left the reading out itself.
         speed_error = np.where(np.isfinite(speed_error), speed_error, 0.0)
@@ -487,11 +487,11 @@ class CrossheadTest:
                 Varying(one.value, {p: one.slopes[p] for p in one.slopes if p in by})
                 for one in (moment, factor)
             )
-        work, shape = moment * factor, factor.value.shape
-        return Varying(
-            self._gathered(work.value),
-            {p: self._gathered(spread(slope, shape)) for p, slope in work.slopes.items()},
-        )
+        slopes = {p: self._summed(slope, factor.value) for p, slope in moment.slopes.items()}
+        for p, slope in factor.slopes.items():
+            more = self._summed(moment.value, slope)
+            slopes[p] = slopes[p] + more if p in slopes else more
+        return Varying(self._summed(moment.value, factor.value), slopes)
 
     def _numbers_of_runs(self, variant: FrameVariant, values: Mapping[str, float]) -> Varying:
         """What each run has of its own, (n_runs,); see numbers_of_runs."""

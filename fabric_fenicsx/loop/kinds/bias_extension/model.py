@@ -389,8 +389,9 @@ class BiasExtension(CrossheadTest):
     def _of_crossings(self) -> Records:
         return self._going.records
 
-    def _gathered(self, values: Array) -> Array:
-        return np.asarray(values.sum(axis=1)[self._going.at])
+    def _summed(self, moment: Array, factor: Array) -> Array:
+        work = np.einsum("ij,ij->i", *np.broadcast_arrays(moment, factor))
+        return np.asarray(work[self._going.at])
 
     def _shown(self, values: Array) -> Array:
         return self._recorded.at_readings(values[self._going.at, GROUPS - 1])
