@@ -156,6 +156,21 @@ def test_noise_that_is_as_stated_is_so_in_what_was_held_out(fitted, held, foreto
     assert judge.foretells(model) is foretold
 
 
+@pytest.mark.parametrize(("held", "foretold"), [(1.0, True), (1.5, False)])
+def test_held_out_readings_as_noisy_as_was_stated_contradict_nothing(held, foretold):
+    """Where the fitted ones scatter by less than half of that."""
+    t = np.tile(np.linspace(0.0, 1.0, 100), 2)
+    run = np.repeat([0, 1], 100)
+    scatter = SIGMA * np.where(run == 0, 0.45, held)
+    observed = 2.0 + t + scatter * np.random.default_rng(3).normal(size=200)
+    data = readings(observed, run=run, holdout=(1,), specimen=np.zeros_like(run))
+    test = Linear(data, {"a": np.ones_like(t), "b": t}, ("a", "b"), noise=SIGMA)
+    judge = Judge(test, [])
+    model = judge.weighed(fit(test, (), {"a": 2.0, "b": 1.0}, data.fit, NOISE), ())
+    assert judge.misfit(model).reading < 0.6 * SIGMA
+    assert judge.foretells(model) is foretold
+
+
 @pytest.mark.parametrize(
     ("correlation", "named", "term", "alone"),
     [(0.1, 0, 0, 0), (0.3, 1, 0, 0), (0.7, 1, 1, 0), (0.9, 1, 1, 1)],

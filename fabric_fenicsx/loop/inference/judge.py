@@ -370,7 +370,8 @@ class Judge:
         limit = max(allowed, self._by_chance(model, count, of_others=bool(out.any())))
         # Noise of somewhat more than was stated is as stated; of less it makes no error larger.
         held_out = error * min(noise, self._as_stated(noise))
-        return bool(held_out <= limit * self.misfit(model).reading)
+        # What is within the noise as it was stated contradicts nothing, however little others do.
+        return bool(held_out <= limit * max(self.misfit(model).reading, self.given or 0.0))
 
     def _known_of(self, model: Model) -> list[str]:
         """Parameters of terms without a formula, which have to be known where they foretell."""
