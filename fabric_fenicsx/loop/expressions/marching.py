@@ -23,7 +23,7 @@ from ...mechanics.scalars import evaluated, lowered, parted, steps_of, symbol
 from ..kept import Kept
 from .compiled import march
 
-__all__ = ["MOST_KEPT", "Marched", "Varying", "spread"]
+__all__ = ["MOST_KEPT", "ONE_RECORD", "Marched", "Varying", "spread"]
 
 Array = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.int64]

@@ -39,7 +39,6 @@ __all__ = ["CrossheadTest"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
-Numbers = npt.NDArray[np.int64]
 
 #: Share of the largest size below which a reading on the other side of 0 is none.
 LITTLE = 0.05
@@ -133,7 +132,7 @@ class CrossheadTest:
         self._slips = Slips(recorded.records)
         self._moments = CrossingMoments(
             self._compiled,
-            lambda v: self._from_earlier_runs(v, self._of_crossings.runs),
+            self._from_earlier_runs,
             lambda: recorded.each(self._before["specimen"]),
             lambda v, values: recorded.of_each(self._numbers_of_runs(v, values)),
         )
@@ -498,8 +497,8 @@ class CrossheadTest:
         fitted = self.readings.run[self.readings.fit]
         return numbers_of_runs(variant, values, self._count, int(fitted.min()))
 
-    def _from_earlier_runs(self, variant: FrameVariant, runs: Numbers) -> dict[str, Array]:
-        """What a form's law remembers where some runs begin, by name; see Marched."""
+    def _from_earlier_runs(self, variant: FrameVariant) -> dict[str, Array]:
+        """What a form's law remembers where a run begins, by name; see Marched."""
         return {}
 
     def _with_runs(self, effect: Effect) -> Effect:

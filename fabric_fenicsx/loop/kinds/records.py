@@ -86,7 +86,11 @@ class Records:
     @cached_property
     def first(self) -> Numbers:
         """The first point of the record that each one is of, (n_points,)."""
-        return np.repeat(self.begins, 1 + self.ends - self.begins)
+        return self.at_points(self.begins)
+
+    def at_points(self, of_each: Numbers) -> Numbers:
+        """A number of each record, (n_records,), at its points."""
+        return np.repeat(of_each, 1 + self.ends - self.begins)
 
     def of(self, run: int) -> slice:
         """The points of a run."""

@@ -34,5 +34,4 @@ class GoingRuns:
         self.points = np.flatnonzero(np.isin(records.run, self.runs))
         self.records = Records(records.run[self.points])
         begins = self.records.begins[np.searchsorted(self.runs, own)]
-        further = np.repeat(begins - records.begins, 1 + records.ends - records.begins)
-        self.at = np.arange(len(records.run)) + further
+        self.at = np.arange(len(records.run)) + records.at_points(begins - records.begins)

@@ -40,7 +40,6 @@ from .variant import FrameVariant
 __all__ = ["PictureFrame"]
 
 Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
 
 #: Share by which speeds may differ that are one.
 SAME_RATE = 0.1
@@ -77,6 +76,8 @@ class PictureFrame(CrossheadTest):
     def _stand_on(self, recorded: RecordedRig) -> None:
         super()._stand_on(recorded)
         self._rig = {name: recorded.each(lengths) for name, lengths in self._lengths.items()}
+        #: What specimens went through before these runs, the same arrays each time; see Marched.
+        self._earlier: dict[str, Array] = {}
 
     @cached_property
     def curves_only(self) -> bool:
@@ -153,14 +154,16 @@ class PictureFrame(CrossheadTest):
         own = mine if variant.laws is not None else mine[:1]
         return not any(v.of_the_force for v in own)
 
-    def _from_earlier_runs(self, variant: FrameVariant, runs: Numbers) -> dict[str, Array]:
+    def _from_earlier_runs(self, variant: FrameVariant) -> dict[str, Array]:
         if not variant.carried:
             return {}
-        assert isinstance(self._whole, PictureFrame)
-        known = self._whole._past_of_specimens
+        if not self._earlier:
+            assert isinstance(self._whole, PictureFrame)
+            runs, past = self._recorded.records.runs, self._whole._past_of_specimens
+            self._earlier = {name: of_all[runs] for name, of_all in past.items()}
         named = {"variable": variant.carried, "largest": "largest_angle", "side": "side"}
         # The one law of the form counts from 0.
-        return {f"0 {name}": known[of][runs] for name, of in named.items()}
+        return {f"0 {name}": self._earlier[of] for name, of in named.items()}
 
     @cached_property
     def _paths(self) -> Array:
