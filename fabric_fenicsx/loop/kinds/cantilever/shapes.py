@@ -48,9 +48,10 @@ WIDTH, BUMP_WIDTHS = 0.03, (0.03, 0.1)
 APART = (0.15, 0.3, 0.5)
 #: Decays from the clamp or from the free end, as shares of it.
 DECAYS = (0.05, 0.2)
-#: Different overhangs from which on what goes by them may bend, or change at one of them, and runs
-#: before another over which it may change.
-FEWEST_TO_BEND, FEWEST_TO_CHANGE = 4, 5
+#: Different overhangs from which on what goes by them may bend, or change at one of them.
+FEWEST_OVERHANGS = 4
+#: Runs before another over which something may slowly change.
+FEWEST_TO_CHANGE = 5
 #: Over how many runs something settles, or goes over into something else, as a share of them.
 FADING, SLOW = (0.3, 1.0), 0.15
 #: No coefficient is larger: a moment or a weight that is so many times another is none. But a
@@ -101,8 +102,9 @@ def along_the_strip(
 
 def over_overhangs(name: str, count: float, *, constant: bool = False) -> Iterator[Drawn]:
     """Shapes over the few overhangs that there are, so many of them."""
-    yield from splines(name, SPLINES[: 1 + (count >= FEWEST_TO_BEND)], constant=constant)
-    if count >= FEWEST_TO_CHANGE:
+    enough = count >= FEWEST_OVERHANGS
+    yield from splines(name, SPLINES[: 1 + enough], constant=constant)
+    if enough:
         zero = (coefficient(f"{name}_0"),) if constant else ()
 
         def from_zero(place: Of) -> Of:
