@@ -438,6 +438,16 @@ def test_a_form_at_the_edge_may_stand_for_another_law(bound, rivals):
     assert said.rivals["bend"] == rivals
 
 
+@pytest.mark.parametrize(("least", "tried"), [(0.1, False), (2.05, True)], ids=["free", "at bound"])
+def test_a_form_that_drives_the_fabric_to_a_bound_may_stand_for_another_law(least, tried):
+    test = curved("round", 60.0, more=1.0, bound=5.0)
+    a, b = test.baseline
+    test.baseline = (a, replace(b, starts=(3.0,), lower=least))
+    said = diagnose_test(test)
+    assert ("b" in said.final.at_bound) is tried
+    assert ("round" in {c.effect.name for c in said.candidates if c.fit is not None}) is tried
+
+
 @pytest.mark.parametrize(
     ("bound", "found", "rival"),
     [(0.7, "round", "bend"), (1.03, "round", "bend"), (5.0, "bend", "")],

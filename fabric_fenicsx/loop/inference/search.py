@@ -96,6 +96,8 @@ def _doubt(search: Search, further: Search) -> _Doubt | None:
     in_its_way = experiment.each_its_own_way and search.specimens_differ
     doubtful = in_its_way or search.judge.uneven(chosen.fit)
     doubtful |= _at_the_edge(chosen.fit) or _lacks_what_its_name_says(chosen.fit)
+    # A form that leaves the fabric no stiffness has taken its place.
+    doubtful |= any(p.name in chosen.fit.at_bound for p in experiment.baseline if p.lower > 0.0)
     rivals = bool(own) and (experiment.terms_are_rivals or doubtful)
     single = [term for term in experiment.terms if not term.of_two]
     if len(own) > 1:
