@@ -401,16 +401,16 @@ def test_a_term_that_leaves_doubtful_noise_is_not_all(monkeypatch, doubtful):
     columns["hum"] = lambda t: np.cos(90.0 * t)
     test = made(columns, columns["kink"], [linear_effect(n) for n in names])
     test.terms = [linear_effect(n, acts_on="reading") for n in ("kink", "hum")]
-    together = []
-    own = Several._together
+    beside = []
+    own = Several._beside
     monkeypatch.setattr(
-        Several, "_together", lambda self, *a: together.append(self.effects) or own(self, *a)
+        Several, "_beside", lambda self, *a: beside.append(self.effects) or own(self, *a)
     )
     monkeypatch.setattr(Judge, "doubtful_noise", lambda self, model: doubtful)
     found = diagnose_test(test)
     assert [e.name for e in found.effects] == ["kink"]
-    assert bool(together) is doubtful
-    assert all(set(test.terms) <= set(effects) for effects in together)
+    assert bool(beside) is doubtful
+    assert all(set(test.terms) <= set(effects) for effects in beside)
 
 
 @pytest.mark.parametrize(("much", "found"), [(0.0, {"kink"}), (0.015, {"kink", "hum"})])
@@ -428,6 +428,26 @@ def test_a_term_that_leaves_a_little_more_than_was_stated_is_not_all(much, found
     assert single.accounted and not single.doubtful_noise
     assert single.may_be_more is (much > 0.0)
     assert {e.name for e in diagnose_test(test).effects} == found
+
+
+@pytest.mark.parametrize(("much", "together"), [(0.0, False), (0.3, True)])
+def test_pairs_are_fitted_where_something_beside_a_doubtful_term_is_better(
+    monkeypatch, much, together
+):
+    """Where nothing is, what is doubtful is noise, and no more is looked for."""
+    columns = {
+        "kink": lambda t: np.where(t > 0.5, np.sin(40.0 * t), 0.0),
+        "hum": lambda t: np.cos(90.0 * t),
+    }
+    test = made(columns, lambda t: columns["kink"](t) + much * columns["hum"](t), [])
+    test.terms = [linear_effect(n, acts_on="reading") for n in columns]
+    tried, own = [], Several._together
+    monkeypatch.setattr(Several, "_together", lambda *a: tried.append(a) or own(*a))
+    monkeypatch.setattr(Judge, "settled", lambda *a: True)
+    monkeypatch.setattr(Judge, "doubtful_noise", lambda self, model: True)
+    found = diagnose_test(test)
+    assert bool(tried) is together
+    assert {e.name for e in found.effects} == ({"kink", "hum"} if together else {"kink"})
 
 
 def test_more_is_added_to_the_next_term_of_one_variable_as_well():

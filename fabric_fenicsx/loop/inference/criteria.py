@@ -59,8 +59,7 @@ class Criteria:
         stated_within: relative sigma of a noise that was stated; convention.
         slow_noise: correlation of neighbouring readings beyond which noise looks like a misfit;
             convention.
-        slow_beside: ... beside a term without a formula, which may not be all; made-up.
-        slow_named: ... beside effects with names, where one without may do better; made-up.
+        slow_beside: ... beside effects, which may not be all, or not the best; made-up.
         readings_per_knot, most_knots: of the smooth line that a misfit is looked for with;
             convention.
         blocks: parts, of several stretches each, that are left out in turn where there is one run;
@@ -129,8 +128,7 @@ class Criteria:
     usual_share: float = 0.05
     stated_within: float = 0.15
     slow_noise: float = 0.8
-    slow_beside: float = 0.5
-    slow_named: float = 0.15
+    slow_beside: float = 0.15
     readings_per_knot: int = 8
     most_knots: int = 20
     blocks: int = 5

@@ -229,9 +229,7 @@ class Judge:
         if self.given is None:
             if not model.effects:
                 return self.slow_noise(model)
-            named = all(effect.listed for effect in model.effects)
-            slow = CRITERIA.slow_named if named else CRITERIA.slow_beside
-            return model.estimate.variances.noise.correlation > slow
+            return model.estimate.variances.noise.correlation > CRITERIA.slow_beside
         return self.misfit(model).reading > CRITERIA.scatter * self.given
 
     def may_hide_another(self, model: Model) -> bool:

@@ -70,7 +70,14 @@ class Several:
             level = [m for m in level if not m.over_two] or level
         bases = self._bases(count, level)
         self._added_beside |= {frozenset(base.variants) for base in bases}
-        levels.append(self._together(count, bases))
+        beside = self._beside(bases)
+        if self._terms and not in_its_place and self.models.judge.settled(fewer, levels[0][0]):
+            # What may be noise is noise where nothing beside it is decidedly better.
+            limit = fewer.criterion - CRITERIA.decisive
+            if not any(m.criterion < limit for m in self.models.weighed(beside)):
+                levels.append([])
+                return
+        levels.append(self._together(count, beside))
         limit = fewer.criterion + CRITERIA.decisive
         if in_its_place and not any(m.criterion < limit for m in levels[-1]):
             levels[-1] = []
@@ -112,21 +119,21 @@ class Several:
         best = self.models.with_solutions(level[:1])
         return [*best, *(self._other_forms(best[0]) if best and count == 2 else [])]
 
-    def _together(self, count: int, bases: Sequence[Fit]) -> list[Model]:
-        """Models of several effects, the best first.
-
-        Args:
-            count: of effects.
-            bases: models of one effect less, which others are added to.
-        """
-        combinations = self._screened().best(CRITERIA.combinations, count)
-        fits = self.models.fitted(combinations, starts=1)
+    def _beside(self, bases: Sequence[Fit]) -> list[Fit]:
+        """Models of some others with one effect more each, fitted."""
         most = CRITERIA.terms if self._terms else None
         starts = 1 if self._terms else min(len(bases), 2)
+        found: list[Fit] = []
         for base in bases:
             more = self.added_to(base, most)
-            fits += self.models.fitted(more, starts=starts, base=base, most=most)
-        return self.models.ranked(fits)
+            found += self.models.fitted(more, starts=starts, base=base, most=most)
+        return found
+
+    def _together(self, count: int, beside: Sequence[Fit]) -> list[Model]:
+        """Models of so many effects, the best first: those that were found and likely ones."""
+        combinations = self._screened().best(CRITERIA.combinations, count)
+        fits = self.models.fitted(combinations, starts=1)
+        return self.models.ranked([*fits, *beside])
 
     def _other_effects(self, level: Sequence[Model]) -> list[Model]:
         """What comes next to the best of a level by itself, of terms that go by one variable.
