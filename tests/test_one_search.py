@@ -350,13 +350,19 @@ def test_what_is_far_behind_a_rival_is_tried_in_its_likeliest_form_alone():
     assert {"near", "also near"} < forms[True] and len(forms[True]) == 3
 
 
-@pytest.mark.parametrize(("times", "gives_way"), [(1.4, False), (1.6, True)])
-def test_three_effects_are_not_fitted_where_a_term_leaves_far_less_than_two(times, gives_way):
+@pytest.mark.parametrize(
+    ("of_two", "times", "gives_way"),
+    [(False, 1.05, False), (False, 1.1, True), (True, 1.4, False), (True, 1.6, True)],
+)
+def test_three_effects_are_not_fitted_where_a_term_leaves_less_than_two(of_two, times, gives_way):
+    """Far less, where it is over two variables, and no simpler than two of them."""
     test = made({"kink": lambda t: t**2}, lambda t: 3.0 * t**2, [linear_effect("kink")])
     further = search(test)
     assert further.accounted
     final = further.found.final
-    further.found = SimpleNamespace(verdict="effect_discovered", effects=["kink"], final=final)
+    term = linear_effect("kink", acts_on="reading")
+    effects = [replace(term, of_two=of_two)]
+    further.found = SimpleNamespace(verdict="effect_discovered", effects=effects, final=final)
     two = SimpleNamespace(
         effects=("one", "other"), fit=replace(final, residual=times * final.residual)
     )

@@ -96,8 +96,8 @@ class Criteria:
         worthwhile: those that leave no more than this many times what the best one does; made-up.
         hopeless: sigmas of a reading that several effects leave, to first order, beyond which they
             are not fitted where a single term without a formula leaves noise; made-up.
-        half_again: times what such a term leaves that two effects leave, beyond which no three are
-            fitted; made-up.
+        half_again: times what a term over two variables leaves that two effects leave, beyond which
+            no three are fitted (``enough`` where it goes by one); made-up.
         one_more: sum of squares, white and per reading, that an effect may leave to first order,
             to be what specimens differ by that were each tested in a way of their own; made-up.
         far_off: a first start of a form that leaves this many times more than the best start, to

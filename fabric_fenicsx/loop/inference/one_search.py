@@ -111,6 +111,9 @@ class Search:
             levels = self._with_other_readings(candidates, levels)
         baseline = levels[0][0]
         self.singles = levels[1] if len(levels) > 1 else ()
+        if self.gave_way:
+            # What another search has found is reported, with these candidates by themselves.
+            levels = levels[:2]
         chosen, verdict, final, in_their_place = self._chosen_of(levels)
         self.accounted = self.judge.accounts(chosen, baseline)
         self.doubtful_noise = self.judge.doubtful_noise(chosen)
@@ -229,7 +232,9 @@ class Search:
             return False
         if len(nearest.effects) > 1:
             left = nearest.fit.rms(nearest.fit.used) / found.final.rms(found.final.used)
-            return left > CRITERIA.half_again
+            # A term over two variables is no simpler than two effects, and three may do as well.
+            of_two = any(effect.of_two for effect in found.effects)
+            return left > (CRITERIA.half_again if of_two else CRITERIA.enough)
         base, variances = self.models.base, found.final.variances
         linear = ToFirstOrder(self.experiment, base, variances, None)
         listed = {e: forms for e, forms in self._signatures.items() if e.listed}
