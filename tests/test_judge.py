@@ -429,6 +429,23 @@ def test_what_is_beaten_decisively_is_not_named(monkeypatch, sigmas, found):
     assert [e.name for e in said.effects] == [found]
 
 
+@pytest.mark.parametrize(
+    ("jumps", "gain", "significant"), [(False, 50.0, False), (True, 50.0, True), (True, 5.0, False)]
+)
+def test_of_what_readings_jump_with_the_likelihood_tells(jumps, gain, significant):
+    """Slopes say next to nothing of it: a standard error of a thousand times its own."""
+    judge, model = judged(size=5.0)
+    (variant,) = model.fit.variants
+    bend = replace(variant.parameters[0], jumps=jumps)
+    unknown = model.fit.root.copy()
+    unknown[list(model.fit.values).index("bend")] *= 1e3
+    of_slopes = replace(model.fit, variants=(replace(variant, parameters=(bend,)),), root=unknown)
+    without = fit(judge.experiment, (), {"a": 2.0, "b": 1.0}, judge.rows, NOISE)
+    fewer = replace(judge.weighed(without, ()), criterion=model.criterion + gain)
+    assert judge.significant(model, [fewer])
+    assert judge.significant(replace(model, fit=of_slopes), [fewer]) is significant
+
+
 @pytest.mark.parametrize(("bound", "rivals"), [(0.7, ["round"]), (5.0, [])])
 def test_a_form_at_the_edge_may_stand_for_another_law(bound, rivals):
     said = diagnose_test(curved("round", 60.0, more=1.0, bound=bound))

@@ -408,7 +408,8 @@ class Judge:
 
         For its shape as it was found: without the effect there would be none. What a term without
         a formula has as a factor of the elastic law others of its numbers seem to make up for, if
-        it is large; that they cannot is seen where they were fitted without it.
+        it is large; that they cannot is seen where they were fitted without it. So is that of what
+        readings jump with, which slopes say nothing of.
 
         Args:
             model: the model.
@@ -423,12 +424,13 @@ class Judge:
                 return bool(chi2.sf(size, len(own)) < 2.0 * norm.sf(CRITERIA.significant))
 
             as_found = beyond(p.name for p in variant.shapes)
-            if effect.listed or as_found:
+            jumps = any(p.jumps for p in variant.amplitudes)
+            if as_found or (effect.listed and not jumps):
                 return as_found
             kept = set(model.effects) - {effect}
             without = [m.criterion for m in fewer if set(m.effects) == kept]
             needed = min(without, default=-np.inf) > model.criterion + CRITERIA.decisive
-            return needed and beyond(name for name in model.fit.values if name not in own)
+            return needed and (jumps or beyond(n for n in model.fit.values if n not in own))
 
         return all(map(significant, model.effects, model.fit.variants))
 
