@@ -17,7 +17,7 @@ from ...inference.effects import Values, valued
 from ..records import FEWEST_BY_TURNS, SHARP, between_runs, one_alone
 
 __all__ = [
-    "ANY",
+    "ANY_CURVE",
     "DECAYS",
     "HEAVIEST",
     "LARGEST",
@@ -40,7 +40,7 @@ __all__ = [
 #: Numbers of coefficients of a spline.
 SPLINES = (1, 2)
 #: And of one that is about any curve, of what a camera does to each picture alike.
-ANY = 6
+ANY_CURVE = 6
 #: Where a step, or a bump, may begin to be looked for, as a share of the longest strip.
 STEPS, BUMPS = (0.15, 0.3, 0.45, 0.6, 0.8), (0.1, 0.2, 0.3, 0.45, 0.6, 0.8)
 #: Likewise of what is counted from its free end.

@@ -31,7 +31,7 @@ from ..records import FEWEST_BEFORE
 from .own_terms import own_terms
 from .products import products
 from .shapes import (
-    ANY,
+    ANY_CURVE,
     DECAYS,
     HEAVIEST,
     LARGEST,
@@ -308,7 +308,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
     forms = [
         form("even", (even,), lambda p, x: p[even.name], "z", to) for to in ("scale", "picture")
     ]
-    forms += [form(*shape, "z", "scale") for shape in splines(name, (*SPLINES, ANY))]
+    forms += [form(*shape, "z", "scale") for shape in splines(name, (*SPLINES, ANY_CURVE))]
     forms.append(form(*wave(name), "z", "height"))
     forms.append(form(*saturation(name, DECAYS, 0.02), "z", "height"))
     forms += [form(*shape, "z", "height") for shape in places(name, SHARPEST)]
@@ -321,7 +321,7 @@ def _of_the_camera(ranges: Mapping[str, float]) -> Iterator[Effect]:
         StripVariant("turned", (turn,), shape=shape, camera=lambda p, at: turned(p[turn.name], at))
     ]
     forms += [form(*shape, "x", "scale") for shape in splines(name, SPLINES)]
-    forms += [form(*shape, "x", "height") for shape in splines(name, (*SPLINES[1:], ANY))]
+    forms += [form(*shape, "x", "height") for shape in splines(name, (*SPLINES[1:], ANY_CURVE))]
     forms.append(form(*wave(name), "x", "height"))
     forms.append(form(*saturation(name, DECAYS, 0.02), "x", "height"))
     forms += [form(*shape, "x", "height") for shape in places(name, SHARPEST)]
