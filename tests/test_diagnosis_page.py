@@ -203,6 +203,7 @@ REPORT = {
     "curve": None,
     "holdout_expected": 0.05,
     "scatter": {},
+    "in_scatter": [],
     "noise_model": {
         "words": "independent readings of one sigma",
         "stated": None,

@@ -20,6 +20,7 @@ from .inference.effects import Effect
 from .inference.experiment import Experiment
 from .inference.first_order import SMALL
 from .inference.next_tests import next_tests
+from .inference.same_specimen import same_specimen_tests
 from .inference.search import diagnose_test
 from .kinds import KINDS
 from .measurement.kind import Kind
@@ -123,14 +124,23 @@ def diagnose(
         kind.join(experiment, same, diagnosis, [found for found, _, _ in parts], effects)
         part(0.95, "further tests")
         noise = diagnosis.noise_model
+        inflation = (1.0 + noise.correlation) / (1.0 - noise.correlation)
         advice = next_tests(
             experiment,
             kind,
             same,
             diagnosis.pairs,
             diagnosis.noise,
-            (1.0 + noise.correlation) / (1.0 - noise.correlation),
+            inflation,
             diagnosis.final.variances.scatter,
+        )
+        advice += same_specimen_tests(
+            experiment,
+            kind,
+            same,
+            diagnosis.final,
+            diagnosis.in_scatter,
+            diagnosis.noise * inflation**0.5,
         )
         terms = discovered_terms(diagnosis, 1 + sum(len(found) for _, _, found in parts))
         parts.append((diagnosis, test_report(diagnosis, same, advice, terms), terms))

@@ -13,6 +13,7 @@ from .curve import Curve
 from .effects import Effect
 from .experiment import Experiment
 from .fitted import Fit
+from .in_scatter import InScatter
 from .noise import Noise, Whiteness
 from .validation import Laboratory
 
@@ -139,6 +140,7 @@ class Diagnosis:
         laboratories: where there are several folders, what the others say of each.
         pairs: effects that are not told apart, with the models of each that fit as well.
         of_the_curve: effects that are such a curve, where one was looked for.
+        in_scatter: effects that may be what specimens differ by in ``final``, the likeliest first.
         joined: models with what another test of the fabric found, the best first.
     """
 
@@ -170,5 +172,6 @@ class Diagnosis:
     others: tuple[Beside, ...] = ()
     laboratories: tuple[Laboratory, ...] = ()
     pairs: list[Pair] = field(default_factory=list)
+    in_scatter: tuple[InScatter, ...] = ()
     notes: list[str] = field(default_factory=list)
     joined: list[Joined] = field(default_factory=list)

@@ -146,6 +146,8 @@ class Foretold:
         run: experiment of the further run alone.
         scatter: relative scatter between specimens, by parameter; empty where its specimen is one
             that was measured.
+        specimen: the number of that one, where it is to be as the model found it; by default it is
+            as all are in common.
 
     Attributes:
         read_at_fit: the run as the fit foretells it, (n,).
@@ -154,8 +156,24 @@ class Foretold:
         SolveError: the model has no solution for it.
     """
 
-    def __init__(self, known: Known, run: Experiment, scatter: Mapping[str, float]) -> None:
+    def __init__(
+        self,
+        known: Known,
+        run: Experiment,
+        scatter: Mapping[str, float],
+        specimen: int | None = None,
+    ) -> None:
         self.known, self._run = known, run
+        #: What a parameter of that specimen is, over what all have in common.
+        self._of_specimen = (
+            {}
+            if specimen is None
+            else {
+                name: 1.0 + float(deviation[specimen])
+                for group, deviation in known.fitted.deviations.items()
+                for name in group.split()
+            }
+        )
         variants = known.fitted.variants
         of_one = [p for v in variants for p in v.parameters if p.of_one]
         self._variants = tuple(of_the_first(v) for v in variants)
@@ -240,10 +258,12 @@ class Foretold:
         for name, k in other.items():
             values[name] += self._scatter[name] * float(theta[k])
         values |= {name: float(theta[k]) for name, k in own.items()}
+        for name, factor in self._of_specimen.items():
+            values[name] *= factor
         y, slopes = self._run.predict(self._variants, values)
         J = np.zeros((len(y), len(theta)))
         for name, k in (*self._place.items(), *own.items()):
-            J[:, k] = slopes[name]
+            J[:, k] = slopes[name] * self._of_specimen.get(name, 1.0)
         for name, k in other.items():
             J[:, k] = slopes[name] * self._scatter[name]
         rows = self._run.readings.usable

@@ -35,7 +35,7 @@ from .experiment import Experiment
 from .fitted import Fit
 from .foretold import Foretold, Known
 
-__all__ = ["NextTest", "best_tests", "next_tests", "next_tests_report"]
+__all__ = ["NextTest", "best_tests", "further_runs", "next_tests", "next_tests_report"]
 
 Array = npt.NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def next_tests(
             needs a new specimen does not know. Others are made on a specimen that was measured,
             which is taken to be as the fit says.
     """
-    further = _further(experiment, kind, kind.proposals(measurements) if pairs else [])
+    further = further_runs(experiment, kind, kind.proposals(measurements) if pairs else [])
     return [
         found
         for a, fits_a, b, fits_b in pairs
@@ -129,10 +129,10 @@ def _written(column: Array) -> float | list[float]:
     return float(rounded[0]) if np.ptp(rounded) == 0.0 else [float(v) for v in rounded]
 
 
-def _further(
+def further_runs(
     experiment: Experiment, kind: Kind, proposals: Sequence[Proposal]
 ) -> list[tuple[Proposal, Experiment]]:
-    """Proposals with their models, where they have one."""
+    """Proposals with their models, where they have one: of a kind, like those of an experiment."""
     found = []
     for proposal in proposals:
         try:
@@ -157,6 +157,7 @@ def best_tests(
     *,
     count: int = 3,
     draws: int = DRAWS,
+    specimen: int | None = None,
 ) -> list[NextTest]:
     """The runs that tell two effects apart best, the best first.
 
@@ -170,6 +171,7 @@ def best_tests(
         scatter: see next_tests.
         count: runs wanted.
         draws: of the true model's parameters, beside its fit itself.
+        specimen: that the runs are made on, where it is to be as the models found it; see Foretold.
     """
     sides = [_Side(experiment, fits, sigma, draws) for fits in (fits_a, fits_b)]
     if not all(side.models for side in sides):
@@ -178,7 +180,9 @@ def best_tests(
     for proposal, run in further:
         own = scatter if proposal.new_specimen else {}
         try:
-            both = [[Foretold(known, run, own) for known in side.models] for side in sides]
+            both = [
+                [Foretold(known, run, own, specimen) for known in side.models] for side in sides
+            ]
         except SolveError:
             continue
         first = min(

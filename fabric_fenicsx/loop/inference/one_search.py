@@ -25,6 +25,7 @@ from .experiment import Experiment
 from .first_order import ToFirstOrder
 from .fitted import Fit
 from .in_common import InCommon
+from .in_scatter import in_scatter
 from .judge import Model
 from .models import Models
 from .noise import quantum
@@ -130,6 +131,8 @@ class Search:
         of_the_curve = self._of_the_curve(levels) if curve is not None else ()
         instead = models_instead(self.judge, levels, chosen) if verdict == "unexplained" else {}
         rivals = rivals_of(self.models, final, in_their_place)
+        one_more = len(chosen.effects) + 1
+        more = levels[one_more] if verdict != "unexplained" and one_more < len(levels) else ()
         fitted = [(c, c.fit) for c in candidates if c.fit is not None]
         # Those far behind have not got their own noise and scatter yet.
         pairs = [(c.effect, fit) for c, fit in fitted]
@@ -167,6 +170,7 @@ class Search:
             criterion_after=final.criterion,
             curve=curve,
             of_the_curve=of_the_curve,
+            in_scatter=tuple(in_scatter(self.judge, more, chosen)),
             others=errors_beside(self.judge, baseline.fit, final.fit, nearest.fit, misfit.noise),
             laboratories=tuple(laboratories(self.experiment, judged.fit, misfit.noise)),
             notes=[*self.experiment.notes, *notes_of(self.judge, final, baseline.fit)],

@@ -41,6 +41,7 @@ class Proposal:
         columns: what is prescribed, as in a CSV of the run, (n,) each.
         new_specimen: whether a specimen that was not measured yet is needed, so that it differs
             from the others as specimens do.
+        again: numbers of the runs on whose specimens it can be done as well.
         model: of that measurement; None: its kind's own.
     """
 
@@ -48,6 +49,7 @@ class Proposal:
     measurement: Measurement
     columns: Mapping[str, Array]
     new_specimen: bool
+    again: tuple[int, ...] = ()
     model: Callable[[Sequence[Measurement]], Experiment] | None = None
 
     @property
@@ -65,6 +67,7 @@ def proposed(
     unknown: Mapping[str, Array],
     *,
     new_specimen: bool = True,
+    again: Sequence[int] = (),
     own: Mapping[str, float] = MappingProxyType({}),
 ) -> Proposal:
     """A further run of a measurement's rig and fabric.
@@ -75,10 +78,11 @@ def proposed(
         columns: what is prescribed, (n,) each.
         unknown: what is to be measured, (n,) each, with something in its place.
         new_specimen: see Proposal.
+        again: likewise.
         own: what only this kind's runs have.
     """
     run = Run("next.csv", False, label, {**columns, **unknown}, own=own)
-    return Proposal(label, replace(like, runs=(run,)), columns, new_specimen)
+    return Proposal(label, replace(like, runs=(run,)), columns, new_specimen, tuple(again))
 
 
 def typical_count(measurements: Sequence[Measurement]) -> int:

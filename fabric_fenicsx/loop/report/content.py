@@ -85,6 +85,21 @@ def test_report(
         "noise_source": d.noise_source,
         "noise_model": noise_model(d),
         "scatter": scatter(d.final),
+        "in_scatter": [
+            _form(
+                d,
+                one.fit,
+                one.effect,
+                next(v for v in one.fit.variants if v in one.effect.variants),
+            )
+            | {
+                "gain": one.gain,
+                "groups": list(one.groups),
+                "error_fit": one.fit.rms(rows),
+                "error_holdout": one.fit.rms(held) if held.any() else None,
+            }
+            for one in d.in_scatter
+        ],
         "holdout_expected": d.holdout_expected,
         "laboratories": [
             asdict(lab) | {"folder": str(measurements[lab.folder].folder)} for lab in d.laboratories
@@ -312,6 +327,7 @@ def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
 def _parameters(d: Diagnosis) -> list[Parameter]:
     """Of every model in the report, each once."""
     models = [model for model in (d.final, d.best, *d.instead) if model is not None]
+    models += [one.fit for one in d.in_scatter]
     found = {p.name: p for model in models for p in parameters_of(d.experiment, model.variants)}
     return list(found.values())
 

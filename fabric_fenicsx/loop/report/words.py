@@ -68,10 +68,11 @@ def _verdict(report: Mapping[str, Any]) -> str:
     before, after = (_value(report, error[when]["holdout"]) for when in ("before", "after"))
     scatter = f"a reading scatters by {_value(report, error['noise'])}"
     if report["verdict"] == "no_effect":
-        return (
-            "The baseline model explains the data, no effect has to be added: "
-            f"held-out error {before}{_foreseen(report)}; {scatter}."
-        )
+        says = "The baseline model explains the data, no effect has to be added"
+        if report["in_scatter"]:
+            says = f"The baseline model explains the data if specimens differ{_by(report)}"
+        errors = f"held-out error {before}{_foreseen(report)}; {scatter}"
+        return f"{says}: {errors}.{_if_alike(report)}"
     if report["verdict"] == "effect_found":
         names = _listed([effect["name"] for effect in report["effects"]])
         verb = "explain" if len(report["effects"]) > 1 else "explains"
@@ -82,7 +83,7 @@ def _verdict(report: Mapping[str, Any]) -> str:
         for effect in report["effects"]:
             if effect["rivals"]:
                 text += f" This data cannot tell {effect['name']} from {one_of(effect['rivals'])}."
-        return text
+        return text + _differing(report)
     if report["verdict"] == "effect_discovered":
         return _discovered(report, before, after, scatter)
     fitted = error["before"]["fit"]
@@ -151,7 +152,39 @@ def _discovered(report: Mapping[str, Any], before: str, after: str, scatter: str
             f" The {_value(report, fitted)} that are left in the fitted runs are more than that: "
             "the law is near such a shape and not of it, or something smaller acts as well."
         )
-    return text + "".join(_not_told(term) for term in terms if term["rivals"])
+    text += "".join(_not_told(term) for term in terms if term["rivals"])
+    return text + _differing(report)
+
+
+def _by(report: Mapping[str, Any]) -> str:
+    """How much specimens have to differ if no effect makes it, in parameters."""
+    groups = dict.fromkeys(group for one in report["in_scatter"] for group in one["groups"])
+    shares = [
+        f"{100.0 * report['scatter'][group]['share']:.0f} % ({_called(report, group)})"
+        for group in groups
+        if group in report["scatter"]
+    ]
+    return f" by {_listed(shares)}" if shares else ""
+
+
+def _if_alike(report: Mapping[str, Any], *, also: bool = False) -> str:
+    """What is not known where one more effect may be what specimens differ by."""
+    if not report["in_scatter"]:
+        return ""
+    names = one_of([one["name"] for one in report["in_scatter"]])
+    most = max(one["gain"] for one in report["in_scatter"])
+    return (
+        f" If they do not, there is {names}{' as well' * also}: that is likelier by {most:.1f} in "
+        f"−2 log evidence, which does not decide ({CRITERIA.decisive:g} would). One specimen, "
+        "tested both ways and said to be one, would tell."
+    )
+
+
+def _differing(report: Mapping[str, Any]) -> str:
+    """The same beside effects that were found."""
+    if not report["in_scatter"]:
+        return ""
+    return f" Specimens have to differ{_by(report)} for that.{_if_alike(report, also=True)}"
 
 
 def _not_told(term: Mapping[str, Any]) -> str:
@@ -199,10 +232,12 @@ def _foreseen(report: Mapping[str, Any]) -> str:
 
 
 def _specimens(report: Mapping[str, Any]) -> Iterator[str]:
+    doubtful = {group for one in report["in_scatter"] for group in one["groups"]}
     differ = [
         f"{100.0 * s['share']:.0f} ± {100.0 * s['std']:.0f} % ({_called(report, group)})"
         for group, s in report["scatter"].items()
         if s["share"] > max(SMALL_SCATTER, CRITERIA.significant * s["std"])
+        and group not in doubtful
     ]
     if differ:
         yield f"Specimens differ by {', '.join(differ)}."

@@ -30,15 +30,23 @@ def proposals(measurements: Sequence[Measurement]) -> list[Proposal]:
     other = like.rig.model_copy(update={"upside_down": not like.rig.upside_down})
     turned = replace(like, rig=other)
     double, half = rounded(2.0 * longest), rounded(0.5 * shortest)
+    everyone = [run for m in measurements for run in m.runs]
+    fitted = [number for number, run in enumerate(everyone) if not run.holdout]
+    of_longest = [k for k in fitted if longest in everyone[k].columns["length_mm"]]
 
     def strip(
-        label: str, like: Measurement, length: float, *, new_specimen: bool = True
+        label: str,
+        like: Measurement,
+        length: float,
+        *,
+        new_specimen: bool = True,
+        again: Sequence[int] = (),
     ) -> Proposal:
         s = np.round(np.linspace(length / count, length, count), DECIMALS)
         columns = {"length_mm": np.full(count, length), "s_mm": s}
         # Any line that hangs will do: with arc lengths it is only where the readings are.
         unknown = {"x_mm": s, "z_mm": np.zeros(count)}
-        return proposed(label, like, columns, unknown, new_specimen=new_specimen)
+        return proposed(label, like, columns, unknown, new_specimen=new_specimen, again=again)
 
     return [
         strip(f"a new strip of {double:g} mm overhang, about twice the longest", like, double),
@@ -47,12 +55,14 @@ def proposals(measurements: Sequence[Measurement]) -> list[Proposal]:
             like,
             half,
             new_specimen=False,
+            again=fitted,
         ),
         strip(
             f"the strip of {longest:g} mm turned upside down in its clamp",
             turned,
             longest,
             new_specimen=False,
+            again=of_longest,
         ),
         strip(f"one more strip of {longest:g} mm overhang", like, longest),
     ]

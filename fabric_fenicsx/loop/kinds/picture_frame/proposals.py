@@ -88,16 +88,21 @@ def proposals(measurements: Sequence[Measurement]) -> list[Proposal]:
                 [leg(beyond, speed), leg(0.0, speed)],
             )
         )
-    found = [_proposal(label, like, *travelled(legs, count)) for label, legs in programmes]
+    # A frame can be loaded again with what is in it.
+    everyone = [run for m in measurements for run in m.runs]
+    again = [number for number, run in enumerate(everyone) if not run.holdout]
+    found = [_proposal(label, like, *travelled(legs, count), again) for label, legs in programmes]
     first = runs[0][1]
     same = (first.columns["time_s"], first.columns["displacement_mm"])
     name = first.label or first.file
     return [*found, _proposal(f"the programme of {name} on another specimen", runs[0][0], *same)]
 
 
-def _proposal(label: str, like: Measurement, time: Array, travel: Array) -> Proposal:
+def _proposal(
+    label: str, like: Measurement, time: Array, travel: Array, again: Sequence[int] = ()
+) -> Proposal:
     columns = {"time_s": time, "displacement_mm": travel}
-    return proposed(label, like, columns, {"force_N": np.zeros(len(time))})
+    return proposed(label, like, columns, {"force_N": np.zeros(len(time))}, again=again)
 
 
 def _angle(travel: Array, frame: float) -> Array:
