@@ -578,6 +578,21 @@ def test_derivatives_of_what_gives_way(tmp_path, label, size):
         assert np.abs(slopes[p] - change).max() < 1e-5 * np.abs(change).max(), p
 
 
+@pytest.mark.parametrize("name", ["travel_of_force", "travel_of_recent_force"])
+def test_a_free_travel_may_be_beside_what_gives_way(tmp_path, name):
+    """With next to nothing of that it is as it is alone."""
+    experiment = write(tmp_path / "set", soft_train)
+    form = one_of(experiment, name, "linear")
+    nothing = {p.name: 1e-9 if p in form.amplitudes else 12.0 for p in form.parameters}
+    backlash = next(e for e in experiment.effects if e.name == "crosshead_backlash")
+    for free in backlash.variants:
+        own = {p.name: 0.2 if p in free.amplitudes else p.starts[0] for p in free.parameters}
+        alone, _ = experiment.predict((free,), BASE | own)
+        both, slopes = experiment.predict((free, form), BASE | own | nothing)
+        np.testing.assert_allclose(both, alone, atol=1e-6 * np.abs(alone).max())
+        assert set(slopes) == {*BASE, *own, *nothing}
+
+
 @pytest.mark.parametrize("name", ["reading_of_force_lag", "travel_of_recent_force"])
 def test_derivatives_of_what_remembers(tmp_path, name):
     """In the coefficient, the memory and the baseline, against central differences."""

@@ -84,7 +84,8 @@ class RecordedRig:
             rate = derivative_of(true, marched.at["D"]) * marched.at["D_rate"]
             history = {"D": true} if variant.remembers_travel else {}
             self._compiled[key] = marched.define({"D": true, "D_rate": rate}, history)
-        return self._compiled[key](self.points, values, begins=self.records.begins)
+        moved = self._compiled[key](self.points, values, begins=self.records.begins)
+        return {**self.points, **moved}
 
     def added(
         self, variant: FrameVariant, wanted: str, force: Varying, values: Mapping[str, float]
