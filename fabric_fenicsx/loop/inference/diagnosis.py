@@ -15,6 +15,7 @@ from .experiment import Experiment
 from .fitted import Fit
 from .in_scatter import InScatter
 from .noise import Noise, Whiteness
+from .smoothing import Smoothed
 from .validation import Laboratory
 
 __all__ = ["Beside", "Candidate", "Diagnosis", "Joined", "Round", "Verdict"]
@@ -120,6 +121,7 @@ class Diagnosis:
         verdict: what is said in the end.
         noise, noise_source: sigma of a reading and where it comes from.
         noise_model: of the reported model, or of the one that came nearest.
+        smoothed: how the readings seem to have been smoothed; None where they do not.
         quantum: step of the values that were written; 0 where there is none.
         baseline: the fitted baseline.
         final: the fitted model that is reported; the baseline where nothing was added.
@@ -149,6 +151,7 @@ class Diagnosis:
     noise: float
     noise_source: str
     noise_model: Noise
+    smoothed: Smoothed | None
     quantum: float
     baseline: Fit
     final: Fit

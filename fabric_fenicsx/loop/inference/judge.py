@@ -12,7 +12,7 @@ was not; noise is what is printed. Holdout runs are looked at for that alone.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb, log
 
 import numpy as np
@@ -25,7 +25,8 @@ from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitted import Fit
 from .fitting import groups_of, linearised
-from .noise import Noise, Whiteness, missed_readings, outliers, whiteness
+from .noise import Noise, Whiteness, missed_readings, outliers, steps_back, whiteness
+from .smoothing import Smoothed, smoothed
 from .validation import CrossValidation, cross_validated, parts_by, stretches
 from .variances import (
     Estimate,
@@ -72,11 +73,14 @@ class Misfit:
             each run allowed for: what is left of readings next to each other.
         noise: that and the model's own error, where it is known to have one: what is printed.
         whiteness: tests of what the model leaves.
+        smoothed: how the readings seem to have been smoothed; None where noise is correlated in no
+            other way than the model of it has.
     """
 
     reading: float
     noise: float
     whiteness: Whiteness
+    smoothed: Smoothed | None
 
 
 class Judge:
@@ -212,11 +216,27 @@ class Judge:
                 rows,
                 chance_of_no_misfit(lined, model.estimate),
             )
+            way = self._smoothed(model, white)
+            if way is not None:
+                # What a first order autoregression leaves of that is no structure.
+                white = replace(white, lags=way.chance, period=way.chance)
             error = self._readings.model_error
             own_error = 0.0 if error is None else np.sqrt(np.mean(np.sum(error[rows] ** 2, axis=1)))
             printed = float(np.hypot(noise, own_error))
-            self._misfits[model.fit] = Misfit(noise, printed, white)
+            self._misfits[model.fit] = Misfit(noise, printed, white, way)
         return self._misfits[model.fit]
+
+    def _smoothed(self, model: Model, white: Whiteness) -> Smoothed | None:
+        """How readings were smoothed, where noise goes together otherwise than it is taken to."""
+        if min(white.lags, white.period) > CRITERIA.structure_p:
+            return None
+        fit, readings, noise = model.fit, self._readings, model.estimate.variances.noise
+        rows = fit.used
+        errors = fit.residual[rows] / noise.sigma(readings)[rows]
+        starts = np.flatnonzero(steps_back(readings, rows) != 1)
+        known = noise.whitener(readings, rows)(fit.slopes[rows] @ fit.root)
+        way = smoothed(np.split(errors, starts[1:]), float(np.sum(known**2)))
+        return way if way is not None and way.chance > CRITERIA.structure_p else None
 
     def _as_stated(self, noise: float) -> float:
         """What was stated, where a noise is no other: nobody knows theirs better."""
@@ -229,7 +249,8 @@ class Judge:
         if self.given is None:
             if not model.effects:
                 return self.slow_noise(model)
-            return model.estimate.variances.noise.correlation > CRITERIA.slow_beside
+            slow = model.estimate.variances.noise.correlation > CRITERIA.slow_beside
+            return slow and self.misfit(model).smoothed is None
         return self.misfit(model).reading > CRITERIA.scatter * self.given
 
     def may_hide_another(self, model: Model) -> bool:

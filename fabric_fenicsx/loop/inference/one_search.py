@@ -146,6 +146,7 @@ class Search:
             noise=misfit.noise,
             noise_source=noise_source(self.judge, misfit.reading),
             noise_model=judged.estimate.variances.noise,
+            smoothed=misfit.smoothed,
             quantum=quantum(self.experiment.readings, self.judge.rows),
             baseline=baseline.fit,
             final=final.fit,
@@ -281,7 +282,9 @@ class Search:
             best = _nearest(levels)
             if not levels[-1] or (self._settled(best, levels[0][0]) and not best.over_two):
                 break
-            self.gave_way = self.gives_way(best)
+            # What leaves noise leaves no term far less of it.
+            quiet = self.judge.settled(best, levels[0][0])
+            self.gave_way = not quiet and self.gives_way(best)
             if self.gave_way:
                 break
             self.progress(0.5 + 0.15 * (count - 2), f"fit {count} effects together")
@@ -305,8 +308,12 @@ class Search:
         alike: list[Fit] = []
         tried: Sequence[Effect] = self.effects
         if self._screened_first:
-            # What noise hides as it was about the baseline may be as good as the best.
-            tried = screen.most_promising(CRITERIA.terms, CRITERIA.decisive)
+            # What noise hides as it was about the baseline may be as good as the best. Where the
+            # baseline leaves noise, and nothing seems to gain on it, all are as good.
+            quiet = (
+                self.judge.settled(levels[0][0], levels[0][0]) and screen.gain < CRITERIA.decisive
+            )
+            tried = screen.most_promising(CRITERIA.terms, 0.0 if quiet else CRITERIA.decisive)
         for k, (effect, first) in enumerate(
             zip(tried, self._far_behind(screen, tried), strict=True)
         ):

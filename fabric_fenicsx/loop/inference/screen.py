@@ -138,6 +138,13 @@ class Screen:
         ranked = sorted(worth, key=lambda effect: worth[effect], reverse=True)
         return [e for k, e in enumerate(ranked) if k < count or worth[e] > worth[ranked[0]] - near]
 
+    @property
+    def gain(self) -> float:
+        """The most that any effect takes off, less what it costs."""
+        return max(
+            (float(self._worth[group]) for group in self._best_of_each.values()), default=0.0
+        )
+
     def best_form(self, effect: Effect) -> Combination:
         """The form of an effect by which it is ranked, in its best shape."""
         group = self._groups[self._best_of_each[effect]]

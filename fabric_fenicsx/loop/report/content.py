@@ -173,7 +173,9 @@ def noise_model(d: Diagnosis) -> dict[str, Any]:
     noise, readings = d.noise_model, d.experiment.readings
     unit, stated = parameter_unit(d.experiment.quantity), d.experiment.noise
     words = []
-    if noise.correlation > CRITERIA.said_correlation:
+    if d.smoothed is not None:
+        words.append(d.smoothed.words)
+    elif noise.correlation > CRITERIA.said_correlation:
         words.append(f"correlated from one reading to the next by {noise.correlation:.2f} (AR(1))")
     at_largest = noise.share * float(np.abs(readings.observed).max())
     if at_largest > noise.floor:
@@ -191,6 +193,7 @@ def noise_model(d: Diagnosis) -> dict[str, Any]:
         "share": noise.share,
         "correlation": noise.correlation,
         "quantum": d.quantum,
+        "smoothed_over": None if d.smoothed is None else d.smoothed.window,
         "stated": stated,
         "other_than_stated": bool(other),
         "other_than_white": bool(words),

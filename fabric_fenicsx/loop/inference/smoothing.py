@@ -1,0 +1,113 @@
+"""Readings that were smoothed before they were handed on: what neighbours then have in common.
+
+Where each reading is a weighted mean of the white readings about it, Σ_k c_k e_(i+k), those l apart
+have the correlation ρ_l = Σ_k c_k c_(k+l) / Σ_k c_k², which ends with the window, as that of no
+first order autoregression does. p numbers that were fitted, and change slowly along lines much longer than LAGS,
+take off b = (p/n) (1 + 2 Σ ρ_l) of each correlation. With r_l those that are found, to lag L,
+
+    (r - ρ')ᵀ (W/n + s² 1)⁻¹ (r - ρ') ~ χ²_L,    ρ'_l = (ρ_l - b) / (1 - b),
+    W_lm = Σ_(j≥1) (ρ_(j+l) + ρ_(j-l) - 2 ρ_j ρ_l) (ρ_(j+m) + ρ_(j-m) - 2 ρ_j ρ_m)
+
+(Bartlett's covariance of them: Brockwell & Davis, Time Series: Theory and Methods, 1991, ch. 7.2).
+s is what narrower windows at the ends of a run, and corners that were smoothed with the noise,
+change them by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import savgol_coeffs
+from scipy.stats import chi2
+
+__all__ = ["LAGS", "Smoothed", "smoothed"]
+
+Array = npt.NDArray[np.float64]
+
+#: Correlations that are looked at, to readings so far apart.
+LAGS = 12
+#: Windows of means, and of parabolas through the readings about each (Savitzky & Golay).
+MEANS, PARABOLAS = range(2, 10), range(5, 13, 2)
+#: s: no more than what parts a window from the next one. Convention.
+CHANGED = 0.02
+#: Fewest readings, all lines together, whose correlations say anything.
+FEWEST = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Smoothed:
+    """A way of smoothing, and how well it agrees with what neighbours have in common.
+
+    Attributes:
+        window: readings that go into each one.
+        parabola: whether each is that of a parabola through them, rather than their mean.
+        chance: of correlations as far from its own.
+    """
+
+    window: int
+    parabola: bool
+    chance: float
+
+    @property
+    def words(self) -> str:
+        """For the report."""
+        of = "of a parabola through" if self.parabola else "the mean of"
+        return f"smoothed, each reading {of} {self.window}"
+
+
+def smoothed(lines: Sequence[Array], parameters: float) -> Smoothed | None:
+    """The way of smoothing that agrees best with the correlations of some errors.
+
+    Args:
+        lines: errors of readings next to each other, of one variance, (n_i,) each.
+        parameters: numbers that were fitted to them, those of specimens as far as they are free.
+
+    Returns:
+        None where there are too few.
+    """
+    count = sum(len(line) for line in lines)
+    if count < FEWEST:
+        return None
+    size = sum(float(line @ line) for line in lines)
+    found = [sum(float(e[lag:] @ e[:-lag]) for e in lines if len(e) > lag) for lag in _LAG]
+    # A sum over fewer pairs than there are readings.
+    pairs = np.array([sum(max(len(line) - lag, 0) for line in lines) for lag in _LAG])
+    r = np.array(found) / size * count / np.maximum(pairs, 1)
+    tried = [(n, False) for n in MEANS] + [(n, True) for n in PARABOLAS]
+    share = parameters / count
+    return max((_compared(r, count, share, *way) for way in tried), key=lambda one: one.chance)
+
+
+_LAG = range(1, LAGS + 1)
+
+
+def _compared(r: Array, count: int, share: float, window: int, parabola: bool) -> Smoothed:
+    rho, W = _expected(window, parabola)
+    taken = share * (1.0 + 2.0 * float(rho.sum()))
+    off = r - (rho - taken) / (1.0 - taken)
+    size = off @ np.linalg.solve(W / count + CHANGED**2 * np.eye(LAGS), off)
+    return Smoothed(window, parabola, float(chi2.sf(size, LAGS)))
+
+
+@cache
+def _expected(window: int, parabola: bool) -> tuple[Array, Array]:
+    """ρ, (LAGS,), and W, (LAGS, LAGS)."""
+    c = savgol_coeffs(window, 2) if parabola else np.full(window, 1.0 / window)
+    both = np.correlate(c, c, "full")[window - 1 :] / float(c @ c)
+    # To twice as far as any window reaches.
+    far = 3 * LAGS
+    rho = np.zeros(2 * far + 1)
+    for lag, value in enumerate(both):
+        rho[far + lag] = rho[far - lag] = value
+    j = np.arange(1, far - LAGS + 1)
+    rows = np.array(
+        [
+            rho[far + j + lag] + rho[far + j - lag] - 2.0 * rho[far + j] * rho[far + lag]
+            for lag in _LAG
+        ]
+    )
+    return rho[far + 1 : far + LAGS + 1], rows @ rows.T

@@ -1,0 +1,91 @@
+"""Readings that were smoothed before they were handed on."""
+
+import numpy as np
+import pytest
+from linear import Linear, readings
+from scipy.signal import lfilter, savgol_filter
+
+from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.judge import Judge
+from fabric_fenicsx.loop.inference.noise import Noise
+from fabric_fenicsx.loop.inference.smoothing import smoothed
+from fabric_fenicsx.loop.inference.variances import Variances
+
+COUNTS = (120, 90, 150, 140)
+
+
+def mean(e, window):
+    """Of the readings about each; at the ends of those there are."""
+    half = window // 2
+    return np.array([e[max(0, i - half) : i + half + 1].mean() for i in range(len(e))])
+
+
+def lines(make, seed):
+    rng = np.random.default_rng(seed)
+    found = [make(rng.normal(size=n + 60))[30 : n + 30] for n in COUNTS]
+    sigma = np.sqrt(np.mean(np.concatenate(found) ** 2))
+    return [line / sigma for line in found]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("make", "window", "parabola"),
+    [
+        *((lambda e, w=w: mean(e, w), w, False) for w in (3, 5, 9)),
+        *((lambda e, w=w: savgol_filter(e, w, 2), w, True) for w in (5, 9)),
+    ],
+)
+def test_a_window_is_found(make, window, parabola, seed):
+    way = smoothed(lines(make, seed), 0.0)
+    assert (way.window, way.parabola) == (window, parabola) and way.chance > 0.001
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda e: e,
+        lambda e: lfilter([1.0], [1.0, -0.4], e),
+        # A reading's own noise, beside what goes slowly.
+        lambda e: lfilter([1.0], [1.0, -0.8], e) + e[::-1],
+        # What a model misses: a wave, and a kink in every 20 readings.
+        lambda e: e + np.sin(np.arange(len(e)) * 2.0 * np.pi / 9.0),
+        lambda e: e + 3.0 * np.exp(-0.5 * ((np.arange(len(e)) % 20 - 9.0) / 1.5) ** 2),
+    ],
+)
+def test_what_was_not_smoothed_is_not_said_to_be(make, seed):
+    assert smoothed(lines(make, seed), 0.0).chance < 0.001
+
+
+def test_what_was_fitted_takes_off_correlations():
+    """Lines with their slow parts taken out, as by a parameter each."""
+    t = np.linspace(-1.0, 1.0, 100)
+    V = np.polynomial.legendre.legvander(t, 2)
+    Q, _ = np.linalg.qr(V)
+    rng = np.random.default_rng(0)
+    found = [mean(rng.normal(size=160), 9)[30:130] for _ in range(20)]
+    found = [line - Q @ (Q.T @ line) for line in found]
+    sigma = np.sqrt(np.mean(np.concatenate(found) ** 2))
+    found = [line / sigma for line in found]
+    assert smoothed(found, 60.0).chance > 0.001 > smoothed(found, 0.0).chance
+    assert smoothed(found, 60.0).window == 9
+
+
+def test_few_readings_say_nothing():
+    assert smoothed([np.ones(30)], 0.0) is None
+
+
+@pytest.mark.parametrize("wave", [0.0, 0.15])
+def test_smoothed_noise_is_no_structure(wave):
+    """And a wave of six readings, as large as it, is."""
+    run = np.repeat([0, 1, 2, 3], 150)
+    x = np.tile(np.linspace(0.0, 1.0, 150), 4)
+    rng = np.random.default_rng(2)
+    noise = np.concatenate([mean(rng.normal(size=150), 3) for _ in range(4)])
+    observed = 5.0 * x + 0.2 * noise + wave * np.sin(np.arange(600) * 2.0 * np.pi / 6.0)
+    experiment = Linear(readings(observed, run=run), {"slope": x}, ["slope"])
+    judge, rows = Judge(experiment, []), np.ones(600, dtype=bool)
+    line = fit(experiment, (), {"slope": 5.0}, rows, Variances(Noise(0.12)))
+    found = judge.misfit(judge.weighed(line, ()))
+    assert found.whiteness.structured is (wave > 0.0)
+    assert (None if found.smoothed is None else found.smoothed.window) == (3 if not wave else None)
