@@ -2,8 +2,8 @@
 
 Where each reading is a weighted mean of the white readings about it, Σ_k c_k e_(i+k), those l apart
 have the correlation ρ_l = Σ_k c_k c_(k+l) / Σ_k c_k², which ends with the window, as that of no
-first order autoregression does. p numbers that were fitted, and change slowly along lines much longer than LAGS,
-take off b = (p/n) (1 + 2 Σ ρ_l) of each correlation. With r_l those that are found, to lag L,
+first order autoregression does. p numbers that were fitted, and change little from one reading to
+the next, take off b = (p/n) (1 + 2 Σ ρ_l) of each. With r_l those that are found, to lag L,
 
     (r - ρ')ᵀ (W/n + s² 1)⁻¹ (r - ρ') ~ χ²_L,    ρ'_l = (ρ_l - b) / (1 - b),
     W_lm = Σ_(j≥1) (ρ_(j+l) + ρ_(j-l) - 2 ρ_j ρ_l) (ρ_(j+m) + ρ_(j-m) - 2 ρ_j ρ_m)
