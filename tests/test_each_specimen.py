@@ -56,7 +56,7 @@ def test_what_each_specimen_has_of_its_own_is_as_if_it_were_alone():
     for number, name in enumerate(experiment.readings.specimens):
         runs = tuple(run for run in both.runs if run.specimen == name)
         alone = Cantilever([replace(both, runs=runs)])
-        (constant,) = next(e for e in alone.effects if e.name == "residual_curvature").variants
+        constant, _ = next(e for e in alone.effects if e.name == "residual_curvature").variants
         same, by = alone.predict((constant,), {"C1_MPa": C1, "kappa0_1_mm": CURLS[name]})
         rows = experiment.readings.specimen == number
         assert heights[rows] == pytest.approx(same, abs=1e-8)

@@ -23,7 +23,8 @@ class Parameter:
             "typical_rate": of the median rate; "force": of the largest reading; of a strip that is
             pulled "per_tow_force" and "per_width_force": of one over the largest force on a tow
             and per width, "force_per_width": of the latter; of a cantilever "curvature" or
-            "moment", the largest of them in the fitted baseline.
+            "moment", the largest of them in the fitted baseline, and "per_length", one over the
+            longest overhang.
         jumps: whether readings jump as it passes a value of theirs, so that a fit has to be looked
             for on both sides.
         essential: whether its effect is what its name says only where this one is told from its

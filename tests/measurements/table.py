@@ -130,14 +130,16 @@ def rows(
                     nothing = (float("nan"), float("nan"))
                     yield Row(seed, recipe.name, truth, "not fitted", (), (), {}, *nothing)
                     continue
+            named = found.verdict == "effect_found"
+            called = {e.name: (named and e.by_definition) or e.name for e in found.effects}
             yield Row(
                 seed,
                 recipe.name,
                 truth,
                 found.verdict,
-                tuple(effect.name for effect in found.effects),
+                tuple(called.values()),
                 tuple((e.name,) if e.listed else e.in_general for e in found.effects),
-                found.rivals,
+                {called[name]: rivals for name, rivals in found.rivals.items() if name in called},
                 found.holdout_before / truth.noise,
                 found.holdout_after / truth.noise,
                 _expected(found, truth.noise),

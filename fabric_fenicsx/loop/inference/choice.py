@@ -73,6 +73,9 @@ def verdict_on(judge: Judge, baseline: Model, chosen: Model) -> Verdict:
     if judge.experiment.curves_only:
         # Every effect can be such curves: none is told from the others.
         return "unexplained"
+    names = [e.name if e.listed else e.by_definition for e in chosen.effects]
+    if all(names) and len(set(names)) == len(names) and judge.explains(chosen, baseline):
+        return "effect_found"
     listed = all(e.listed for e in chosen.effects)
     if not judge.explains(chosen, baseline, roughly=not listed):
         return "unexplained"

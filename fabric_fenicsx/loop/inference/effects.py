@@ -115,6 +115,8 @@ class Effect:
         general_form_of: of such a term, names of listed effects that it has as a special case.
         in_general: the listed effects of which such a term is one, whatever its shape; empty where
             it is none.
+        by_definition: the one of these that every such term is by what its name means: it is
+            reported by that; empty where there is none.
         of_two: of such a term, whether it is looked at only where none over one variable will do.
     """
 
@@ -127,6 +129,7 @@ class Effect:
     depends_on: tuple[str, ...] = ()
     general_form_of: tuple[str, ...] = ()
     in_general: tuple[str, ...] = ()
+    by_definition: str = ""
     of_two: bool = False
 
     @property

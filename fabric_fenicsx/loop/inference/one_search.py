@@ -233,7 +233,8 @@ class Search:
             self.run()
         found = self.found
         assert found is not None
-        if found.verdict != "effect_discovered" or len(found.effects) != 1 or not self.accounted:
+        explained = found.verdict in ("effect_found", "effect_discovered") and self.accounted
+        if not explained or len(found.effects) != 1 or found.effects[0].listed:
             return False
         if len(nearest.effects) > 1:
             left = nearest.fit.rms(nearest.fit.used) / found.final.rms(found.final.used)

@@ -52,15 +52,18 @@ def test_report(
     rows, nearest = d.baseline.used & d.experiment.readings.first, nearest_model(d)
     compared = d.experiment.readings.usable & ~d.outliers
     held = compared & d.experiment.readings.holdout & d.experiment.readings.first
+    found = discovered_report(d, terms)
     checks = predictive_check(nearest, compared) if compared.any() else []
     content = {
         "schema": SCHEMA,
         "test": d.experiment.test,
         "verdict": d.verdict,
-        "effects": [] if terms else [_effect(d, effect) for effect in d.effects],
-        "discovered": discovered_report(d, terms),
+        "effects": _effects(d, found) if d.verdict == "effect_found" else [],
+        "discovered": found if d.verdict == "effect_discovered" else [],
         # Effects with a name in a model that needs terms without one: they may be part of those.
-        "beside": [_effect(d, e) for e in d.effects if e.listed] if terms else [],
+        "beside": [
+            _effect(d, e) for e in d.effects if e.listed and d.verdict == "effect_discovered"
+        ],
         "candidates": [
             {
                 "name": c.effect.name,
@@ -284,6 +287,21 @@ def combined_report(reports: Sequence[dict[str, Any]]) -> dict[str, Any]:
     if len(reports) == 1:
         return reports[0]
     return reports[-1] | {"tests": {report["test"]: report for report in reports}}
+
+
+def _effects(d: Diagnosis, terms: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Effects that were found; of one whose form is a curve, all that is said of such a term."""
+    by_name = {term["of"]: term for term in terms}
+
+    def rivals(effect: Effect) -> list[str]:
+        return [n for n in by_name[effect.name]["rival_names"] if n != effect.by_definition]
+
+    return [
+        _effect(d, effect)
+        if effect.listed
+        else by_name[effect.name] | {"name": effect.by_definition, "rivals": rivals(effect)}
+        for effect in d.effects
+    ]
 
 
 def _effect(d: Diagnosis, effect: Effect) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from .effect_file import effect_file
 from .figures import candidates_figure, curve_figure, data_figure, law_figure
 from .law_table import curve_table, law_table
 from .residuals import dependence_figure, noise_figure, residual_figure
-from .words import parameter_unit
+from .words import parameter_unit, terms_of
 
 __all__ = ["Part", "write_report"]
 
@@ -96,6 +96,7 @@ def _write_page(folder: Path, parts: Sequence[Part]) -> None:
                     for error in report.get("errors", [])[1:]
                 ],
                 "added": None if model is None else model[1],
+                "terms": terms_of(report),
                 "rows": _candidate_rows(report),
                 "parameters": _parameter_rows(report),
                 "runs": _run_rows(report),
@@ -194,9 +195,10 @@ def _run_names(report: Mapping[str, Any]) -> list[str]:
 
 def _candidate_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Candidates, the best criterion first, and what became of each."""
-    named = [*report["effects"], *report["beside"]]
+    terms = terms_of(report)
+    named = [e for e in (*report["effects"], *report["beside"]) if e not in terms]
     chosen = {effect["name"]: effect["rivals"] for effect in named}
-    chosen |= {term["of"]: term["rival_names"] for term in report["discovered"]}
+    chosen |= {term["of"]: term["rival_names"] for term in terms}
     before = report["criterion"]["before"]
     rows = []
     for candidate in report["candidates"]:

@@ -9,7 +9,7 @@ from typing import Any
 from ...inputs.keys import UNITS, one_of
 from ..inference.criteria import CRITERIA
 
-__all__ = ["headline", "parameter_unit", "reasons"]
+__all__ = ["headline", "parameter_unit", "reasons", "terms_of"]
 
 PARAMETER_UNITS = {
     "N_s_n": "N sⁿ",
@@ -41,6 +41,11 @@ def parameter_unit(name: str) -> str:
         return OTHER_UNITS[name]
     endings = PARAMETER_UNITS | UNITS
     return next((text for end, text in endings.items() if name.endswith("_" + end)), "")
+
+
+def terms_of(report: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """What a report says of terms without a formula, with another's name or with none."""
+    return [*report["discovered"], *(e for e in report["effects"] if "shape" in e)]
 
 
 def headline(report: Mapping[str, Any]) -> str:
@@ -83,6 +88,8 @@ def _verdict(report: Mapping[str, Any]) -> str:
         for effect in report["effects"]:
             if effect["rivals"]:
                 text += f" This data cannot tell {effect['name']} from {one_of(effect['rivals'])}."
+        for term in terms_of(report):
+            text += f" {term['name']} has a form that is on no list: {term['formula']}."
         return text + _differing(report)
     if report["verdict"] == "effect_discovered":
         return _discovered(report, before, after, scatter)
@@ -296,9 +303,9 @@ def reasons(report: Mapping[str, Any]) -> list[str]:
             f"{best['name']} gains {gain:.1f}, but its amplitude is not {CRITERIA.significant:g} "
             "standard errors from nothing, or it predicts stretches that are left out no better."
         ]
-    chosen = [effect["name"] for effect in report["effects"]]
-    chosen += [effect["name"] for effect in report["beside"]]
-    chosen += [term["of"] for term in report["discovered"]]
+    terms = terms_of(report)
+    named = [e for e in (*report["effects"], *report["beside"]) if e not in terms]
+    chosen = [effect["name"] for effect in named] + [term["of"] for term in terms]
     rivals = [name for effect in report["effects"] for name in effect.get("rivals", ())]
     found = []
     for c in (c for c in tried if c["name"] not in chosen):

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from ufl import exp
+
 from ....mechanics.bending_laws import (
     BendingLaw,
     CubicBending,
@@ -51,6 +53,17 @@ YIELDS = tuple(
     for k, r in enumerate(SLIPS, 1)
 )
 STIFFENING = replace(CUBIC, lower=0.0)
+
+UNLOADED = Parameter("kappa0_1_mm", amplitude=True, meaning="curvature unloaded, up positive")
+CHANGE = Parameter(
+    "change_1_mm",
+    (-0.6, 0.6),
+    -1.2,
+    1.2,
+    meaning="by what share it grows along the strip",
+    share_of="per_length",
+)
+"""Along the longest strip it becomes up to three times, or a third: a roll's has no peak."""
 
 COMPLIANCE = Parameter(
     "compliance_rad_per_N",
@@ -97,14 +110,11 @@ CANTILEVER_EFFECTS = (
         "cantilever",
         "the sheet is not flat when unloaded",
         (
+            StripVariant("constant", (UNLOADED,), unloaded=lambda p: p["kappa0_1_mm"]),
             StripVariant(
-                "constant",
-                (
-                    Parameter(
-                        "kappa0_1_mm", amplitude=True, meaning="curvature unloaded, up positive"
-                    ),
-                ),
-                unloaded=lambda p: p["kappa0_1_mm"],
+                "growing along the strip",
+                (replace(UNLOADED, meaning="curvature unloaded at the clamp, up positive"), CHANGE),
+                added_curvature=lambda p, at: p["kappa0_1_mm"] * exp(p["change_1_mm"] * at["s"]),
             ),
         ),
         of_fabric=False,

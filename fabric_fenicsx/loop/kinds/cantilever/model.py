@@ -143,7 +143,8 @@ class Cantilever:
             measurements, self._observed, covariates, weight=weight, chain=chain
         )
         self._largest_curvature, self._largest_moment = curvature, moment
-        shares = {"curvature": curvature, "moment": moment}
+        longest = float(self._length[self.readings.fit].max())
+        shares = {"curvature": curvature, "moment": moment, "per_length": 1.0 / longest}
         each = self._fitted
         effects = [scaled(e, shares) for e in (*CANTILEVER_EFFECTS, *own)]
         self.effects = [

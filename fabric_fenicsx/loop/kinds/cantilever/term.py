@@ -55,6 +55,7 @@ def strip_effect(
     forms: Iterable[StripVariant],
     general_form_of: tuple[str, ...] = (),
     in_general: tuple[str, ...] = (),
+    by_definition: str = "",
     of_two: bool = False,
 ) -> Effect:
     """A term of its forms."""
@@ -68,6 +69,7 @@ def strip_effect(
         depends_on=depends_on,
         general_form_of=general_form_of,
         in_general=in_general,
+        by_definition=by_definition,
         of_two=of_two,
     )
 

@@ -197,7 +197,14 @@ def _of_the_strip(ranges: Mapping[str, float]) -> Iterator[Effect]:
     ]
     about, of = "any odd law of the curvature", ("nonlinear_bending",)
     yield strip_effect(
-        name, about, "bending_moment", ("curvature",), forms, general_form_of=of, in_general=of
+        name,
+        about,
+        "bending_moment",
+        ("curvature",),
+        forms,
+        general_form_of=of,
+        in_general=of,
+        by_definition=of[0],
     )
 
     for acts_on, unit, about in on_the_strip(ranges):

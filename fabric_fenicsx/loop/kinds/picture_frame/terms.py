@@ -78,6 +78,13 @@ IN_GENERAL = {
 }
 """Listed effects that terms are, whatever their shape."""
 
+BY_DEFINITION = {
+    "dissipative_moment_of_direction": "crossover_friction",
+    "even_moment_of_angle": "tension_coupling",
+    "odd_in_rate_moment_of_rate": "rate_hardening",
+}
+"""Those that they are by what the name means: no more is said of it than its variable."""
+
 
 def terms(
     ranges: Mapping[str, float],
@@ -175,6 +182,7 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
                 acts_on="moment",
                 depends_on=depends_on,
                 in_general=IN_GENERAL.get(name, ()),
+                by_definition=BY_DEFINITION.get(name, ""),
             )
 
 
