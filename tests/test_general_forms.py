@@ -16,12 +16,15 @@ from test_shear_laws import evaluated
 from ufl import as_ufl
 
 from fabric_fenicsx.loop.expressions.marching import Marched, Varying
+from fabric_fenicsx.loop.inference.choice import verdict_on
 from fabric_fenicsx.loop.inference.effects import scaled
 from fabric_fenicsx.loop.kinds.cantilever.effects import CANTILEVER_EFFECTS
 from fabric_fenicsx.loop.kinds.cantilever.terms import terms as strip_terms
 from fabric_fenicsx.loop.kinds.picture_frame.effects import PICTURE_FRAME_EFFECTS
 from fabric_fenicsx.loop.kinds.picture_frame.terms import terms as frame_terms
+from fabric_fenicsx.loop.report.content import _effects
 from fabric_fenicsx.loop.report.discovered import Discovered, discovered_report
+from fabric_fenicsx.loop.report.words import terms_of
 from fabric_fenicsx.mechanics.laws.law import Crossing, Times
 from fabric_fenicsx.mechanics.laws.locking import Locking
 
@@ -296,6 +299,12 @@ def test_signs_of_general_forms_are_those_of_physics():
         assert all(p.lower >= 1 / 3 and p.share_of == "angle" for p in angles)
 
 
+REACHED = (
+    *("angle", "rate", "path", "time", "displacement", "speed", "acceleration", "force"),
+    "force_rate",
+)
+
+
 @pytest.mark.parametrize(
     ("kind", "term", "name"),
     [
@@ -317,10 +326,8 @@ def test_signs_of_general_forms_are_those_of_physics():
 )
 def test_a_term_that_is_a_listed_effect_says_so(kind, term, name):
     """Whatever its shape: any odd bending law is a nonlinear one. Others are kept apart by it."""
-    ranges = dict.fromkeys(
-        ("angle", "rate", "path", "time", "displacement", "speed", "acceleration", "force"), 1.0
-    )
-    ranges |= {"force_rate": 1.0, "length": 250.0, "curvature": 0.01, "x": 200.0, "z": 100.0}
+    ranges = dict.fromkeys(REACHED, 1.0)
+    ranges |= {"length": 250.0, "curvature": 0.01, "x": 200.0, "z": 100.0}
     ranges |= {"stiffness_per_C1": 1e-5, "runs": 1.0, "overhangs": 3.0}
     every = strip_terms(ranges, ()) if kind == "cantilever" else frame_terms(ranges)
     (effect,) = (e for e in every if e.name == term)
@@ -339,6 +346,45 @@ def test_a_term_that_is_a_listed_effect_says_so(kind, term, name):
     names = [rival["name"] for rival in said["rivals"]]
     assert sorted(names) == sorted({name or "nonlinear_bending", *diagnosis.rivals[term]})
     assert [r["name"] for r in said["rivals"] if r.get("in_general")] == [name] * bool(name)
+
+
+@pytest.mark.parametrize(
+    ("names", "left", "verdict"),
+    [
+        (("rate_hardening",), 1.0, "effect_found"),
+        # The rougher limit of terms is for what has no name.
+        (("rate_hardening",), 1.3, "effect_discovered"),
+        (("",), 1.0, "effect_discovered"),
+        (("rate_hardening", ""), 1.0, "effect_discovered"),
+        (("rate_hardening", "tension_coupling"), 1.0, "effect_found"),
+        # Two of one name are more than it says.
+        (("rate_hardening", "rate_hardening"), 1.0, "effect_discovered"),
+        (("rate_hardening",), 2.0, "unexplained"),
+    ],
+)
+def test_what_is_a_listed_effect_by_definition_is_found(names, left, verdict):
+    def explains(model, baseline, *, roughly=False):
+        return left < (1.4 if roughly else 1.25)
+
+    judge = SimpleNamespace(experiment=SimpleNamespace(curves_only=False), explains=explains)
+    effects = [SimpleNamespace(name="a", listed=False, by_definition=name) for name in names]
+    assert verdict_on(judge, None, SimpleNamespace(effects=effects)) == verdict
+
+
+def test_it_is_reported_with_its_name_and_its_curve():
+    by_name = {e.name: e for e in frame_terms(dict.fromkeys(REACHED, 1.0))}
+    effect = by_name["odd_in_rate_moment_of_rate"]
+    term = {
+        "name": "discovered_1",
+        "of": effect.name,
+        "shape": "discovered_1.csv",
+        "rivals": [{"name": "rate_hardening", "in_general": True}],
+        "rival_names": ["rate_hardening", "reading_of_speed"],
+    }
+    (found,) = _effects(SimpleNamespace(effects=(effect,)), [term])
+    assert found["name"] == "rate_hardening" and found["shape"] == "discovered_1.csv"
+    assert found["rivals"] == ["reading_of_speed"]
+    assert terms_of({"discovered": [], "effects": [found, {"name": "load_drift"}]}) == [found]
 
 
 @pytest.mark.parametrize(
