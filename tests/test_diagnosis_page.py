@@ -210,6 +210,7 @@ REPORT = {
         "other_than_stated": False,
         "other_than_white": False,
         "correlation": 0.0,
+        "smoothed_over": None,
     },
     "laboratories": [],
     "own_of_runs": False,

@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 from linear import Linear, readings
 from scipy.signal import lfilter, savgol_filter
+from test_in_scatter import C1, FRICTION, NOISE, force, there_and_back, write
 
+from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.noise import Noise
-from fabric_fenicsx.loop.inference.smoothing import smoothed
+from fabric_fenicsx.loop.inference.smoothing import mean_of, smoothed, window_of
 from fabric_fenicsx.loop.inference.variances import Variances
+from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 
 COUNTS = (120, 90, 150, 140)
 
@@ -89,3 +92,72 @@ def test_smoothed_noise_is_no_structure(wave):
     found = judge.misfit(judge.weighed(line, ()))
     assert found.whiteness.structured is (wave > 0.0)
     assert (None if found.smoothed is None else found.smoothed.window) == (3 if not wave else None)
+
+
+def forces(make, seed):
+    """Of a frame out and back at two speeds, with a jump where it turns."""
+    rng = np.random.default_rng(seed)
+    runs = [there_and_back(speed, count) for speed, count in ((2.0, 400), (9.0, 350))]
+    return [
+        make(force(travel, speed, C1, FRICTION) + NOISE * rng.normal(size=len(travel)))
+        for _, travel, speed in runs
+    ]
+
+
+def drawn(y):
+    return np.random.default_rng(9).normal(size=len(y))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("window", [1, 3, 5, 7])
+def test_a_window_is_seen_before_anything_is_fitted(window, seed):
+    assert window_of(forces(lambda y: mean(y, window), seed)) == window
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "make",
+    [
+        # Slow noise, steps, no noise to speak of, noise that grows.
+        lambda y: (
+            y + 0.1 * lfilter([1.0], [1.0, -0.7], np.random.default_rng(9).normal(size=len(y)))
+        ),
+        lambda y: np.round(y / 0.05) * 0.05,
+        lambda y: np.round(y),
+        lambda y: np.cumsum(np.cumsum(np.ones(len(y)))) / 100.0,
+        lambda y: y + 0.05 * y * drawn(y),
+    ],
+)
+def test_no_window_is_seen_where_there_is_none(make, seed):
+    assert window_of(forces(make, seed)) == 1
+
+
+def test_means_at_the_ends_are_over_what_is_there():
+    values = np.random.default_rng(0).normal(size=20)
+    for window in (3, 5):
+        assert mean_of(values, window) == pytest.approx(mean(values, window), rel=1e-12)
+
+
+@pytest.mark.parametrize("window", [1, 5])
+def test_what_was_smoothed_at_a_turn_is_not_compared(tmp_path, window):
+    """There the force jumps; elsewhere its mean is as good as itself."""
+    runs = [
+        (name, "one", *there_and_back(speed, count), C1, FRICTION)
+        for name, speed, count in (("slow", 2.0, 150), ("fast", 9.0, 110))
+    ]
+    write(tmp_path / "set", runs)
+    for name, *_ in runs:
+        path = tmp_path / "set" / f"{name}.csv"
+        table = np.loadtxt(path, delimiter=",", skiprows=1)
+        table[:, 2] = mean(table[:, 2], window)
+        header = "time_s,displacement_mm,force_N"
+        np.savetxt(path, table, "%.9g", ",", header=header, comments="")
+    measured = read_measurement(tmp_path / "set")
+    usable = PictureFrame([measured]).readings.usable
+    at = np.concatenate([np.abs(np.arange(n) - (n - 1) / 2.0) for n in (150, 110)])
+    assert not usable[at < max(window // 2, 1)].any()
+    # But for the ends, of which a smoothed one is the mean of what lies to one side.
+    assert usable[(at > 2 * window) & (at < 50.0)].all()
+    report = diagnose([measured], effects=("crossover_friction", "rate_hardening")).report
+    assert report["noise_model"]["smoothed_over"] == (window if window > 1 else None)
+    assert report["verdict"] == "effect_found"

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scipy.signal import savgol_coeffs
 from scipy.stats import chi2
 
-__all__ = ["LAGS", "Smoothed", "smoothed"]
+__all__ = ["LAGS", "Smoothed", "mean_of", "smoothed", "window_of"]
 
 Array = npt.NDArray[np.float64]
 
@@ -34,6 +34,13 @@ LAGS = 12
 MEANS, PARABOLAS = range(2, 10), range(5, 13, 2)
 #: s: no more than what parts a window from the next one. Convention.
 CHANGED = 0.02
+#: Differences of neighbours, over and over, that a force that bends hardly changes; those beyond so
+#: many sigmas are a corner's. Convention.
+TIMES, CORNER = 4, 3.5
+#: Chance of their correlations that a window may have at least, and times that of none. Convention.
+AGREES, LIKELIER = 1e-3, 100.0
+#: ``CHANGED`` for these.
+CHANGED_BY_BENDS = 0.05
 #: Fewest readings, all lines together, whose correlations say anything.
 FEWEST = 60
 
@@ -72,32 +79,79 @@ def smoothed(lines: Sequence[Array], parameters: float) -> Smoothed | None:
     count = sum(len(line) for line in lines)
     if count < FEWEST:
         return None
-    size = sum(float(line @ line) for line in lines)
-    found = [sum(float(e[lag:] @ e[:-lag]) for e in lines if len(e) > lag) for lag in _LAG]
-    # A sum over fewer pairs than there are readings.
-    pairs = np.array([sum(max(len(line) - lag, 0) for line in lines) for lag in _LAG])
-    r = np.array(found) / size * count / np.maximum(pairs, 1)
+    r, _ = _correlations(lines, [np.ones(len(line), dtype=bool) for line in lines])
     tried = [(n, False) for n in MEANS] + [(n, True) for n in PARABOLAS]
     share = parameters / count
     return max((_compared(r, count, share, *way) for way in tried), key=lambda one: one.chance)
 
 
+def window_of(lines: Sequence[Array]) -> int:
+    """Of how many readings each one seems to be the mean, before anything is fitted; 1: of none.
+
+    What is measured changes slowly: differences of differences are those of the noise, but at
+    corners.
+
+    Args:
+        lines: readings in a row, in the order of time, (n_i,) each.
+    """
+    lines = [np.diff(line, TIMES) for line in lines if len(line) > 2 * TIMES]
+    if sum(len(line) for line in lines) < FEWEST:
+        return 1
+    sigma = float(np.median(np.abs(np.concatenate(lines)))) / 0.6745
+    seen = [np.abs(line) < CORNER * sigma for line in lines]
+    if not any(own.any() for own in seen):
+        # Steps of the readings are larger than their noise.
+        return 1
+    r, count = _correlations(lines, seen)
+    chances = {n: _compared(r, count, 0.0, n, False, TIMES).chance for n in (1, *MEANS)}
+    best = max(chances, key=lambda n: chances[n])
+    return best if chances[best] > max(AGREES, LIKELIER * chances[1]) else 1
+
+
+def mean_of(values: Array, window: int) -> Array:
+    """Means over so many readings about each, at the ends over those there are, (n,)."""
+    ones = np.ones(window)
+    return np.asarray(
+        np.convolve(values, ones, "same") / np.convolve(np.ones(len(values)), ones, "same")
+    )
+
+
 _LAG = range(1, LAGS + 1)
 
 
-def _compared(r: Array, count: int, share: float, window: int, parabola: bool) -> Smoothed:
-    rho, W = _expected(window, parabola)
+def _correlations(
+    lines: Sequence[Array], seen: Sequence[npt.NDArray[np.bool_]]
+) -> tuple[Array, int]:
+    """Of errors so many readings apart, of those that are seen, (LAGS,), and their number."""
+    own = [np.where(mask, line, 0.0) for line, mask in zip(lines, seen, strict=True)]
+    count = sum(int(mask.sum()) for mask in seen)
+    variance = sum(float(e @ e) for e in own) / count
+
+    def apart(lag: int) -> float:
+        pairs = sum(int((mask[lag:] & mask[:-lag]).sum()) for mask in seen)
+        return sum(float(e[lag:] @ e[:-lag]) for e in own) / max(pairs, 1)
+
+    return np.array([apart(lag) for lag in _LAG]) / variance, count
+
+
+def _compared(
+    r: Array, count: int, share: float, window: int, parabola: bool, times: int = 0
+) -> Smoothed:
+    rho, W = _expected(window, parabola, times)
+    changed = CHANGED_BY_BENDS if times else CHANGED
     taken = share * (1.0 + 2.0 * float(rho.sum()))
     off = r - (rho - taken) / (1.0 - taken)
-    size = off @ np.linalg.solve(W / count + CHANGED**2 * np.eye(LAGS), off)
+    size = off @ np.linalg.solve(W / count + changed**2 * np.eye(LAGS), off)
     return Smoothed(window, parabola, float(chi2.sf(size, LAGS)))
 
 
 @cache
-def _expected(window: int, parabola: bool) -> tuple[Array, Array]:
-    """ρ, (LAGS,), and W, (LAGS, LAGS)."""
+def _expected(window: int, parabola: bool, times: int) -> tuple[Array, Array]:
+    """ρ, (LAGS,), and W, (LAGS, LAGS), of what was smoothed, or of its differences so often."""
     c = savgol_coeffs(window, 2) if parabola else np.full(window, 1.0 / window)
-    both = np.correlate(c, c, "full")[window - 1 :] / float(c @ c)
+    for _ in range(times):
+        c = np.convolve(c, [1.0, -1.0])
+    both = np.correlate(c, c, "full")[len(c) - 1 :] / float(c @ c)
     # To twice as far as any window reaches.
     far = 3 * LAGS
     rho = np.zeros(2 * far + 1)

@@ -25,6 +25,7 @@ from ..expressions.marching import Marched, Varying
 from ..inference.effects import Effect, Variant, of_each, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
 from ..inference.noise import estimated_noise
+from ..inference.smoothing import mean_of, window_of
 from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
 from .crossing_moments import BASELINE, CrossingMoments
@@ -212,8 +213,26 @@ class CrossheadTest:
         # Where nothing is known of the rate the motion has left the reading out itself.
         speed_error = np.where(np.isfinite(speed_error), speed_error, 0.0)
         clear = ~(np.abs(k[-1] * per_speed * speed_error) >= noise)
+        clear &= ~self._smoothed_away(J @ k, noise)
         if (rows & clear).sum() > rows.sum() / 2:
             self.readings = replace(self.readings, usable=self.readings.usable & clear)
+
+    def _smoothed_away(self, expected: Array, noise: float) -> Flags:
+        """Forces that smoothing has changed by more than a reading scatters, (n,).
+
+        As where the crosshead turns, in readings that are each the mean of several: what is read
+        there is no force of the fabric.
+        """
+        forces = self.readings.first
+        rows = [forces & (self.readings.run == run) for run in range(self._count)]
+        found = np.zeros(len(forces), dtype=bool)
+        read = self.readings.observed
+        window = window_of([read[own & np.isfinite(read)] for own in rows])
+        if window > 1:
+            for own in rows:
+                change = mean_of(expected[own], window) - expected[own]
+                found[own] = np.abs(change) >= noise
+        return found
 
     def _start(self) -> None:
         """Begin fits of the baseline with its least squares, which are linear in BASELINE."""

@@ -264,7 +264,7 @@ def _noise(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"Readings scatter by other than the {_value(report, noise['stated'])} stated."
     if noise["other_than_white"]:
         yield f"The noise is {noise['words']}."
-    if noise["correlation"] > CRITERIA.slow_noise:
+    if noise["correlation"] > CRITERIA.slow_noise and noise["smoothed_over"] is None:
         yield "Noise as slow as that cannot be told from a smooth misfit of the model."
 
 
