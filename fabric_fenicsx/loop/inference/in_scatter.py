@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from .criteria import CRITERIA
 from .effects import Effect
 from .fitted import Fit
 from .judge import Judge, Model
@@ -48,11 +49,14 @@ def in_scatter(judge: Judge, level: Sequence[Model], chosen: Model) -> list[InSc
         chosen: the model.
     """
     visible = {g for g, tau in _scatter(chosen).items() if tau > VISIBLE}
+    # What decides and was not chosen did not bear scrutiny, or is not needed.
+    decides = CRITERIA.strong if judge.unlike(chosen.fit) else CRITERIA.decisive
     found: dict[Effect, list[Model]] = {}
     for model in sorted(level, key=lambda m: m.criterion):
         more = set(model.effects) - set(chosen.effects)
         one_more = len(more) == 1 and set(chosen.effects) <= set(model.effects)
-        if one_more and next(iter(more)).listed and model.criterion < chosen.criterion:
+        likelier = 0.0 < chosen.criterion - model.criterion < decides
+        if one_more and next(iter(more)).listed and likelier:
             if _gone(visible, chosen, model) and judge.significant(model):
                 found.setdefault(more.pop(), []).append(model)
     return [

@@ -182,8 +182,8 @@ def _if_alike(report: Mapping[str, Any], *, also: bool = False) -> str:
     most = max(one["gain"] for one in report["in_scatter"])
     return (
         f" If they do not, there is {names}{' as well' * also}: that is likelier by {most:.1f} in "
-        f"−2 log evidence, which does not decide ({CRITERIA.decisive:g} would). One specimen, "
-        "tested both ways and said to be one, would tell."
+        "−2 log evidence, which does not decide. One specimen, tested both ways and said to be "
+        "one, would tell."
     )
 
 
