@@ -132,6 +132,11 @@ def test_no_window_is_seen_where_there_is_none(make, seed):
     assert window_of(forces(make, seed)) == 1
 
 
+def test_no_window_is_seen_in_round_off():
+    out, back = np.linspace(0.0, 20.0, 29), np.linspace(19.0, 0.0, 28)
+    assert window_of([np.r_[out, back]] * 3) == 1
+
+
 def test_means_at_the_ends_are_over_what_is_there():
     values = np.random.default_rng(0).normal(size=20)
     for window in (3, 5):

@@ -41,6 +41,8 @@ TIMES, CORNER = 4, 3.5
 AGREES, LIKELIER = 1e-3, 100.0
 #: ``CHANGED`` for these.
 CHANGED_BY_BENDS = 0.05
+#: Differences of this share of the largest reading are round-off.
+ROUND_OFF = 1e-9
 #: Fewest readings, all lines together, whose correlations say anything.
 FEWEST = 60
 
@@ -94,13 +96,14 @@ def window_of(lines: Sequence[Array]) -> int:
     Args:
         lines: readings in a row, in the order of time, (n_i,) each.
     """
+    largest = max((float(np.abs(line).max(initial=0.0)) for line in lines), default=0.0)
     lines = [np.diff(line, TIMES) for line in lines if len(line) > 2 * TIMES]
     if sum(len(line) for line in lines) < FEWEST:
         return 1
     sigma = float(np.median(np.abs(np.concatenate(lines)))) / 0.6745
     seen = [np.abs(line) < CORNER * sigma for line in lines]
-    if not any(own.any() for own in seen):
-        # Steps of the readings are larger than their noise.
+    if sigma <= ROUND_OFF * largest or not any(own.any() for own in seen):
+        # There is no noise, or steps of the readings are larger than it.
         return 1
     r, count = _correlations(lines, seen)
     chances = {n: _compared(r, count, 0.0, n, False, TIMES).chance for n in (1, *MEANS)}

@@ -225,6 +225,7 @@ class CrossheadTest:
         """
         forces = self.readings.first
         rows = [forces & (self.readings.run == run) for run in range(self._count)]
+        rows = [own for own in rows if own.any()]
         found = np.zeros(len(forces), dtype=bool)
         read = self.readings.observed
         window = window_of([read[own & np.isfinite(read)] for own in rows])
