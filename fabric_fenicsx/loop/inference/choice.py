@@ -76,10 +76,9 @@ def verdict_on(judge: Judge, baseline: Model, chosen: Model) -> Verdict:
     names = [e.name if e.listed else e.by_definition for e in chosen.effects]
     if all(names) and len(set(names)) == len(names) and judge.explains(chosen, baseline):
         return "effect_found"
-    listed = all(e.listed for e in chosen.effects)
-    if not judge.explains(chosen, baseline, roughly=not listed):
+    if all(e.listed for e in chosen.effects) or not judge.explains(chosen, baseline, roughly=True):
         return "unexplained"
-    return "effect_found" if listed else "effect_discovered"
+    return "effect_discovered"
 
 
 def models_instead(

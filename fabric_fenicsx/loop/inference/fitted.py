@@ -169,6 +169,14 @@ class Fit:
         square = np.sum((weight * (self.slopes[rows] @ self._root_given(known))) ** 2, axis=1)
         return float(np.sqrt(np.mean(square)))
 
+    def factors(self, specimen: int) -> dict[str, float]:
+        """What parameters of a specimen are over what all have in common, where they differ."""
+        return {
+            name: 1.0 + float(deviation[specimen])
+            for group, deviation in self.deviations.items()
+            for name in group.split()
+        }
+
     def error_of(self, slopes: Mapping[str, Array]) -> Array:
         """Standard error of a function of the common parameters from its slopes, (n,) each."""
         count = len(next(iter(slopes.values())))

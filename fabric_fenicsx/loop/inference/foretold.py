@@ -165,15 +165,7 @@ class Foretold:
     ) -> None:
         self.known, self._run = known, run
         #: What a parameter of that specimen is, over what all have in common.
-        self._of_specimen = (
-            {}
-            if specimen is None
-            else {
-                name: 1.0 + float(deviation[specimen])
-                for group, deviation in known.fitted.deviations.items()
-                for name in group.split()
-            }
-        )
+        self._of_specimen = {} if specimen is None else known.fitted.factors(specimen)
         variants = known.fitted.variants
         of_one = [p for v in variants for p in v.parameters if p.of_one]
         self._variants = tuple(of_the_first(v) for v in variants)

@@ -74,11 +74,7 @@ def same_specimen_tests(
 
 def _of_specimen(model: Fit, specimen: int, sigma: float) -> Fit:
     """A model of one specimen, known from its readings alone."""
-    factor = {
-        name: 1.0 + float(deviation[specimen])
-        for group, deviation in model.deviations.items()
-        for name in group.split()
-    }
+    factor = model.factors(specimen)
     values = {name: value * factor.get(name, 1.0) for name, value in model.values.items()}
     used = model.used & (model.readings.specimen == specimen)
     over = np.array([factor.get(name, 1.0) for name in values])

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scipy.signal import savgol_coeffs
 from scipy.stats import chi2
 
-__all__ = ["LAGS", "Smoothed", "mean_of", "smoothed", "window_of"]
+__all__ = ["Smoothed", "mean_of", "smoothed", "window_of"]
 
 Array = npt.NDArray[np.float64]
 

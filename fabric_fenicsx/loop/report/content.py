@@ -248,15 +248,12 @@ def _of_run(d: Diagnosis, number: int, checks: Sequence[Check]) -> dict[str, Any
     rows = own & readings.usable & ~d.outliers
     specimen = int(readings.specimen[own][0])
     fitted = bool(rows.any() and not readings.holdout[own].any())
-    deviations = {
-        name: deviation for group, deviation in nearest.deviations.items() for name in group.split()
-    }
+    factors = nearest.factors(specimen)
     check = next((c for c in checks if c.run == number), None)
     return {
         "specimen": readings.specimens[specimen],
         "parameters": {
-            name: value * (1.0 + (deviations[name][specimen] if name in deviations else 0.0))
-            for name, value in nearest.values.items()
+            name: value * factors.get(name, 1.0) for name, value in nearest.values.items()
         }
         if fitted
         else None,
