@@ -26,6 +26,7 @@ from fabric_fenicsx.mechanics.bending_laws import (
     BENDING_LAWS,
     CubicBending,
     HyperbolicBending,
+    PowerBending,
     StickSlipBending,
     TabulatedBending,
     TanhBending,
@@ -43,6 +44,7 @@ EXACT = [
     (TanhBending(2.0, 0.01), lambda k: 2.0 * np.tanh(k / 0.01)),
     (StickSlipBending(2.0, 0.01), lambda k: 2.0 * np.clip(k / 0.01, -1.0, 1.0)),
     (CubicBending(5.0), lambda k: 5.0 * k**3),
+    (PowerBending(200.0, 0.01, 2.5), lambda k: 200.0 * k * (1.0 + (k / 0.01) ** 2) ** 0.75),
     # Of a straight line, and so beyond its points as well, all cubics are that line.
     (TabulatedBending((0.0, 0.01, 0.05), (0.0, -0.2, -1.0)), lambda k: -20.0 * k),
 ]
@@ -90,6 +92,7 @@ def test_a_form_goes_through_the_keys_of_a_case(variant, tmp_path):
 
 LENGTH, SPACING, WEIGHT, C1 = 200.0, 12.0, 4e-6, 8000.0
 HANGS = {"m_s_N": 0.04, "kappa_s_1_mm": 0.002, "b_N_mm3": 2e4, "m_s1_N": 0.02, "m_s2_N": 0.02}
+HANGS |= {"b_N_mm": 2.0, "bending_exponent": 0.5}
 
 
 @pytest.mark.parametrize("variant", NONLINEAR.variants, ids=lambda v: v.label)

@@ -59,6 +59,16 @@ CASES = {
         {"b_N_mm3": B / CRITICAL**2},
         {"law": ("cubic", CRITICAL, 1.0)},
     ),
+    "power": (
+        ("nonlinear_bending", "power"),
+        {
+            "C1_MPa": REST * B / PER_C1,
+            "b_N_mm": (1 - REST) * B,
+            "kappa_s_1_mm": CRITICAL,
+            "bending_exponent": 0.5,
+        },
+        {"law": ("root", CRITICAL, REST)},
+    ),
     "compliance": (
         ("clamp_compliance", "linear"),
         {"compliance_rad_per_N": 20.0 / B},

@@ -8,6 +8,7 @@ moment are those out of the sheet's plane.
     tanh        m = m_s tanh y              ψ = m_s κ_s ln cosh y
     stick-slip  m = m_s y, at most m_s      ψ = m_s κ_s (min(|y|, 1)²/2 + max(|y| − 1, 0))
     cubic       m = b κ³                    ψ = b κ⁴/4
+    power       m = b κ (1 + y²)^((n−1)/2)  ψ = b κ_s² ((1 + y²)^((n+1)/2) − 1)/(n + 1)
     tabulated   m through points            ψ of its cubics, see laws.tabulated
 """
 
@@ -31,6 +32,7 @@ __all__ = [
     "BendingLaw",
     "CubicBending",
     "HyperbolicBending",
+    "PowerBending",
     "SlippingBending",
     "StickSlipBending",
     "TabulatedBending",
@@ -157,6 +159,40 @@ class CubicBending(BendingLaw):
 
 
 @dataclass(frozen=True)
+class PowerBending(BendingLaw):
+    """b κ (1 + (κ/κ_s)²)^((n−1)/2): in proportion to small curvatures, to the n-th power of large.
+
+    It stiffens where n is more than 1, and softens where it is less.
+
+    Attributes:
+        slope: b [N mm].
+        curvature: κ_s [1/mm].
+        exponent: n, not negative.
+    """
+
+    slope: Any = number("b_N_mm", "b, moment per width and small curvature")
+    curvature: Any = number("kappa_s_1_mm", "κ_s, curvature up to which it is in proportion")
+    exponent: Any = number("bending_exponent", "n, power of larger curvatures")
+
+    law = "power"
+
+    def moment(self, kappa: Any, number: Number) -> Any:
+        """See the class."""
+        larger = 1 + (kappa / number(self.curvature)) ** 2
+        return number(self.slope) * kappa * larger ** ((number(self.exponent) - 1) / 2)
+
+    def energy(self, kappa: Any, number: Number) -> Any:
+        """Its integral, with y = κ/κ_s; see the module's docstring."""
+        curvature, further = number(self.curvature), number(self.exponent) + 1
+        larger = 1 + (kappa / curvature) ** 2
+        return number(self.slope) * curvature**2 * (larger ** (further / 2) - 1) / further
+
+    def stiffness(self, number: Number) -> Any:
+        """See slope."""
+        return number(self.slope)
+
+
+@dataclass(frozen=True)
 class TabulatedBending(BendingLaw):
     """Moment through points from (0, 0), as a tester reads it; beyond the last straight on.
 
@@ -197,6 +233,7 @@ BENDING_LAWS: dict[str, type[BendingLaw]] = {
         TanhBending,
         StickSlipBending,
         CubicBending,
+        PowerBending,
         TabulatedBending,
     )
 }

@@ -54,6 +54,9 @@ def moment_ratio(law: tuple[str, float, float] | None, y: np.ndarray) -> np.ndar
         taken = np.minimum(size, 1)
     elif form == "cubic":
         return y * (1 + y**2)
+    elif form == "root":
+        # Of large curvatures it goes by their square root.
+        taken = size / (1 + y**2) ** 0.25
     else:
         raise ValueError(f"law {form}")
     return np.sign(y) * ((1 - rest) * taken + rest * size)

@@ -14,6 +14,7 @@ from ....mechanics.bending_laws import (
     BendingLaw,
     CubicBending,
     HyperbolicBending,
+    PowerBending,
     SlippingBending,
     StickSlipBending,
     TanhBending,
@@ -53,6 +54,13 @@ YIELDS = tuple(
     for k, r in enumerate(SLIPS, 1)
 )
 STIFFENING = replace(CUBIC, lower=0.0)
+IN_POWER = (
+    Parameter("b_N_mm", (), 0.0, amplitude=True, meaning="moment per width and small curvature"),
+    replace(
+        SLIP, starts=(0.1, 0.4), lower=0.02, meaning="curvature up to which it is in proportion"
+    ),
+    Parameter("bending_exponent", (0.3, 2.5), 0.0, 4.0, meaning="power of larger curvatures"),
+)
 
 UNLOADED = Parameter("kappa0_1_mm", amplitude=True, meaning="curvature unloaded, up positive")
 CHANGE = Parameter(
@@ -128,6 +136,9 @@ CANTILEVER_EFFECTS = (
             _slipping("tanh", TanhBending),
             _slipping("stick, then slip", StickSlipBending),
             bending_form("cubic", (CUBIC,), lambda p: (CubicBending(p["b_N_mm3"]),)),
+            bending_form(
+                "power", IN_POWER, lambda p: (PowerBending(*(p[one.name] for one in IN_POWER)),)
+            ),
             bending_form("bundles side by side", (*YIELDS, STIFFENING, FIRST_SLIP), _bundles),
         ),
     ),
