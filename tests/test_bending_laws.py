@@ -92,7 +92,7 @@ def test_a_form_goes_through_the_keys_of_a_case(variant, tmp_path):
 
 LENGTH, SPACING, WEIGHT, C1 = 200.0, 12.0, 4e-6, 8000.0
 HANGS = {"m_s_N": 0.04, "kappa_s_1_mm": 0.002, "b_N_mm3": 2e4, "m_s1_N": 0.02, "m_s2_N": 0.02}
-HANGS |= {"b_N_mm": 2.0, "bending_exponent": 0.5}
+HANGS |= {"b_N_mm": 8.0, "bending_exponent": 0.5}
 
 
 @pytest.mark.parametrize("variant", NONLINEAR.variants, ids=lambda v: v.label)
