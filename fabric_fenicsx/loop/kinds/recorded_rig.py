@@ -78,10 +78,16 @@ class RecordedRig:
             return self.points
         key = (variant, "travel")
         if key not in self._compiled:
-            marched = Marched(("D", "D_rate"), tuple(p.name for p in variant.parameters))
+            inputs = ("D", "D_rate", *["per_time"] * bool(variant.goes_back))
+            marched = Marched(inputs, tuple(p.name for p in variant.parameters))
             past = marched.remembered("D") if variant.remembers_travel else None
             true = variant.travel(marched.at, marched.at["D"], past)
             rate = derivative_of(true, marched.at["D"]) * marched.at["D_rate"]
+            if variant.goes_back:
+                lasts = marched.at[variant.goes_back]
+                # One where the frame is free.
+                free = derivative_of(true, past) * (1 + 1 / (marched.at["per_time"] * lasts))
+                rate -= free * true / lasts
             history = {"D": true} if variant.remembers_travel else {}
             self._compiled[key] = marched.define({"D": true, "D_rate": rate}, history)
         moved = self._compiled[key](self.points, values, begins=self.records.begins)

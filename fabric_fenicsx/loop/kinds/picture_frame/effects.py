@@ -54,6 +54,15 @@ ROUNDING = Parameter(
     share_of="travel",
 )
 
+GOING_BACK = Parameter(
+    "going_back_s",
+    (0.002, 0.03),
+    1e-4,
+    1.0,
+    meaning="time in which a frame that is free goes back to rest",
+    share_of="duration",
+)
+
 
 def _slack(p: Values, D: Any, past: Any) -> Any:
     return max_value(D - p["free_travel_mm"], 0) + min_value(D, 0)
@@ -91,6 +100,15 @@ def _soft_gap(p: Values, D: Any, past: Any) -> Any:
     return engaged(D - out) - engaged(-D - back) - (engaged(-out) - engaged(-back))
 
 
+def _gap(p: Values, D: Any, past: Any) -> Any:
+    """D − b where the frame is pulled, D where it is pushed, and in between there is no force.
+
+    The frame then goes back to where the fabric is at rest, as its dashpots let it: y' = −y/τ.
+    """
+    free = past / (1 + 1 / (p["per_time"] * p[GOING_BACK.name]))
+    return min_value(D, max_value(free, D - p[TRAVEL.name]))
+
+
 def _play_of_each_side(p: Values, D: Any, past: Any) -> Any:
     out, back = p["free_travel_out_mm"], p["free_travel_back_mm"]
     return min_value(D + back, max_value(past, D - out))
@@ -111,6 +129,13 @@ PICTURE_FRAME_EFFECTS = (
             ),
             FrameVariant(
                 "play on the way back", (TRAVEL,), travel=_play(0.0, 1.0), remembers_travel=True
+            ),
+            FrameVariant(
+                "gap that the force closes",
+                (TRAVEL, GOING_BACK),
+                travel=_gap,
+                remembers_travel=True,
+                goes_back=GOING_BACK.name,
             ),
             FrameVariant("soft gap", (OUT, BACK, ROUNDING), travel=_soft_gap),
             FrameVariant(

@@ -26,6 +26,9 @@ class FrameVariant(Variant):
             and the true displacement at the reading before, None unless ``remembers_travel``.
         reading: what the load cell adds [N] at the time t [s].
         remembers_travel: ``travel`` depends on ``past``.
+        goes_back: parameter of ``travel``, the time in which a frame that is free goes back to
+            where the fabric is at rest [s]; "per_time" is then among the parameters. Empty: it
+            stays.
         added_reading: what the load cell adds [N], from the parameters and what ``of`` names.
         added_travel: by how much the frame is ahead of the crosshead [mm], from the same.
         added_rate: how fast that changes [mm/s], likewise; None: as it does from one point to the
@@ -59,6 +62,7 @@ class FrameVariant(Variant):
     travel: Callable[[Values, Any, Any], Any] | None = None
     reading: Callable[[Values, Any], Any] | None = None
     remembers_travel: bool = False
+    goes_back: str = ""
     added_reading: Callable[[Values, Values], Any] | None = None
     added_travel: Callable[[Values, Values], Any] | None = None
     added_rate: Callable[[Values, Values], Any] | None = None
