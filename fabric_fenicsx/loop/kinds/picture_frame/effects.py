@@ -56,7 +56,7 @@ ROUNDING = Parameter(
 
 GOING_BACK = Parameter(
     "going_back_s",
-    (0.002, 0.03),
+    (0.002, 0.008, 0.03),
     1e-4,
     1.0,
     meaning="time in which a frame that is free goes back to rest",
