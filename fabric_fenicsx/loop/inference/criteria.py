@@ -40,7 +40,8 @@ class Criteria:
             which a rival may lose, or held-out runs be less likely; convention (Kass & Raftery,
             J. Am. Stat. Assoc. 90, 1995: very strong evidence).
         strong: ... by which it must where the other one needs specimens that differ by more than
-            twice what is usual; convention (likewise: strong evidence).
+            twice what is usual, and that a term beside one whose noise is doubted must gain to be
+            tried in its place; convention (likewise: strong evidence).
         significant: standard errors that an amplitude must be from nothing, times what is expected
             that a held-out error may be, times what the baseline expects of it that a model may,
             and times what was stated that noise may be; convention.

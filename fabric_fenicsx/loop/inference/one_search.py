@@ -20,9 +20,9 @@ from .choice import chosen_model, in_place_of, models_instead, verdict_on
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis, Verdict
-from .effects import Effect
+from .effects import Effect, Variant
 from .experiment import Experiment
-from .first_order import ToFirstOrder
+from .first_order import Signature, ToFirstOrder
 from .fitted import Fit
 from .in_common import InCommon
 from .in_scatter import in_scatter
@@ -269,6 +269,20 @@ class Search:
         linear = ToFirstOrder(self.experiment, base, alike, CRITERIA.far)
         least = linear.least_left(self.several.added_to(base))
         return least < CRITERIA.one_more * float(base.used.sum())
+
+    def gains_beside(self, model: Model, terms: Sequence[Effect]) -> bool:
+        """Whether a term beside a model takes more off than it costs, to first order.
+
+        A misfit that the model has for noise is what some term would have made instead of it.
+        """
+        base = model.fit
+        self.models.signed(terms)
+        signs: dict[Effect, dict[Variant, list[Signature]]] = {}
+        for ((variant, one),) in self.models.beside(base, terms):
+            own = signs.setdefault(self.models.effect_of(variant), {})
+            own.setdefault(variant, []).append(one)
+        linear = ToFirstOrder(self.experiment, base, model.estimate.variances, CRITERIA.far)
+        return Screen(base, linear, signs).gain > CRITERIA.strong
 
     def _looked_through(self) -> tuple[list[Candidate], list[list[Model]]]:
         """Candidates by themselves, and models by their number of effects, the best first."""
