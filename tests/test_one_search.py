@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from linear import Linear, linear_effect, readings
+from scipy.signal import lfilter
 
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.inputs.parameters import Parameter
@@ -13,6 +14,7 @@ from fabric_fenicsx.loop.inference import one_search, several
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
 from fabric_fenicsx.loop.inference.fitting import fit
+from fabric_fenicsx.loop.inference.hidden import in_noise
 from fabric_fenicsx.loop.inference.in_common import InCommon
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.models import Models
@@ -283,6 +285,31 @@ def test_what_specimens_visibly_differ_by_may_be_a_further_effect(own_way, apart
     assert model.fit.deviations
     assert own._settled(model, without) is settled
     assert own.may_be_one_more(model) is not settled
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_a_term_may_hide_in_noise_that_goes_together(hidden):
+    """What a model misses by looks like slow noise, but a term would have made it."""
+    own_noise = np.random.default_rng(6).normal(scale=0.02, size=(RUNS, EACH))
+    slow = lfilter([1.0], [1.0, -0.8], own_noise, axis=1).ravel()
+    columns = {
+        "kink": lambda t: np.maximum(t - 0.6, 0.0),
+        "wave": lambda t: np.sin(9.0 * t),
+        "hump": lambda t: t * (1.0 - t),
+    }
+    test = made(
+        columns,
+        lambda t: 3.0 * columns["kink"](t) + (0.05 * columns["wave"](t) if hidden else slow),
+        [linear_effect("kink"), *(linear_effect(n, acts_on="reading") for n in ("wave", "hump"))],
+    )
+    kink, *terms = test.effects
+    own = Search(test, test.effects, lambda done, what: None)
+    start = {"a": 10.0, "b": 2.0, "kink": 3.0}
+    fitted = fit(test, kink.variants, start, test.readings.fit, Variances(NOISE))
+    model = own.judge.weighed(fitted, (kink,))
+    assert model.estimate.variances.noise.correlation > 0.3
+    own.models.base = own.models.baseline(own.models.start)
+    assert in_noise(own.models, model, terms) is hidden
 
 
 @pytest.mark.parametrize(("apart", "name"), [(0.0, "kink"), (0.4, "product")])

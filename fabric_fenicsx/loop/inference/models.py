@@ -252,6 +252,10 @@ class Models:
         self._known |= {v: own for forms in found.values() for v, own in forms.items()}
         return found
 
+    def signed_beside(self, model: Fit, effects: Sequence[Effect]) -> Signatures:
+        """A model's sensitivities to each form of some effects that it has not."""
+        return signed(self.experiment, model, effects, self._known)
+
     def beside(
         self, model: Fit, effects: Sequence[Effect], most: int | None = None
     ) -> list[Combination]:

@@ -13,17 +13,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ...errors import SolveError
 from ..kept import Kept
 from .beside import by_itself
 from .choice import chosen_model, in_place_of, models_instead, verdict_on
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis, Verdict
-from .effects import Effect, Variant
+from .effects import Effect
 from .experiment import Experiment
-from .first_order import Signature, ToFirstOrder
+from .first_order import ToFirstOrder
 from .fitted import Fit
+from .hidden import in_specimens
 from .in_common import InCommon
 from .in_scatter import in_scatter
 from .judge import Model
@@ -35,7 +35,6 @@ from .rivals import InPlace, in_place, pairs_of, rivals_of
 from .screen import Screen, Signatures
 from .several import Several
 from .validation import laboratories
-from .variances import Variances
 
 __all__ = ["Search"]
 
@@ -256,33 +255,8 @@ class Search:
         if not self.judge.differ_in_their_way(model):
             return False
         if model not in self._one_more:
-            self._one_more[model] = self._leaves_noise_beside(model)
+            self._one_more[model] = in_specimens(self.models, model, self.several.added_to)
         return self._one_more[model]
-
-    def _leaves_noise_beside(self, model: Model) -> bool:
-        """See may_be_one_more."""
-        try:
-            base = self.models.of_alike_specimens(model)
-        except SolveError:
-            return False
-        alike = Variances(base.variances.noise)
-        linear = ToFirstOrder(self.experiment, base, alike, CRITERIA.far)
-        least = linear.least_left(self.several.added_to(base))
-        return least < CRITERIA.one_more * float(base.used.sum())
-
-    def gains_beside(self, model: Model, terms: Sequence[Effect]) -> bool:
-        """Whether a term beside a model takes more off than it costs, to first order.
-
-        A misfit that the model has for noise is what some term would have made instead of it.
-        """
-        base = model.fit
-        self.models.signed(terms)
-        signs: dict[Effect, dict[Variant, list[Signature]]] = {}
-        for ((variant, one),) in self.models.beside(base, terms):
-            own = signs.setdefault(self.models.effect_of(variant), {})
-            own.setdefault(variant, []).append(one)
-        linear = ToFirstOrder(self.experiment, base, model.estimate.variances, CRITERIA.far)
-        return Screen(base, linear, signs).gain > CRITERIA.strong
 
     def _looked_through(self) -> tuple[list[Candidate], list[list[Model]]]:
         """Candidates by themselves, and models by their number of effects, the best first."""
