@@ -16,6 +16,7 @@ from fabric_fenicsx.loop.inference.noise import Noise
 from fabric_fenicsx.loop.inference.one_search import Search
 from fabric_fenicsx.loop.inference.ranking import cancelling, simplest_first
 from fabric_fenicsx.loop.inference.search import diagnose_test
+from fabric_fenicsx.loop.inference.significance import significant
 from fabric_fenicsx.loop.inference.variances import Variances
 
 #: One sigma of a reading.
@@ -430,9 +431,9 @@ def test_what_is_beaten_decisively_is_not_named(monkeypatch, sigmas, found):
 
 
 @pytest.mark.parametrize(
-    ("jumps", "gain", "significant"), [(False, 50.0, False), (True, 50.0, True), (True, 5.0, False)]
+    ("jumps", "gain", "claimed"), [(False, 50.0, False), (True, 50.0, True), (True, 5.0, False)]
 )
-def test_of_what_readings_jump_with_the_likelihood_tells(jumps, gain, significant):
+def test_of_what_readings_jump_with_the_likelihood_tells(jumps, gain, claimed):
     """Slopes say next to nothing of it: a standard error of a thousand times its own."""
     judge, model = judged(size=5.0)
     (variant,) = model.fit.variants
@@ -442,8 +443,8 @@ def test_of_what_readings_jump_with_the_likelihood_tells(jumps, gain, significan
     of_slopes = replace(model.fit, variants=(replace(variant, parameters=(bend,)),), root=unknown)
     without = fit(judge.experiment, (), {"a": 2.0, "b": 1.0}, judge.rows, NOISE)
     fewer = replace(judge.weighed(without, ()), criterion=model.criterion + gain)
-    assert judge.significant(model, [fewer])
-    assert judge.significant(replace(model, fit=of_slopes), [fewer]) is significant
+    assert significant(model, [fewer])
+    assert significant(replace(model, fit=of_slopes), [fewer]) is claimed
 
 
 @pytest.mark.parametrize(("bound", "rivals"), [(0.7, ["round"]), (5.0, [])])

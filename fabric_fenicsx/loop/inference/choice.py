@@ -9,6 +9,7 @@ from .diagnosis import Verdict
 from .effects import Effect
 from .fitted import Fit
 from .judge import Judge, Model
+from .significance import significant
 
 __all__ = ["chosen_model", "in_place_of", "models_instead", "verdict_on"]
 
@@ -60,7 +61,7 @@ def _bearing_scrutiny(judge: Judge, level: Sequence[Model], fewer: Sequence[Mode
     for model in level:
         near = model.criterion < best.criterion + CRITERIA.decisive
         if near and set(model.effects) == set(best.effects):
-            if judge.significant(model, fewer) and judge.improves(model, fewer[0]):
+            if significant(model, fewer) and judge.improves(model, fewer[0]):
                 return model
     return None
 
@@ -96,7 +97,7 @@ def models_instead(
     for model in levels[len(own)]:
         effects = frozenset(model.effects)
         near = model.criterion < chosen.criterion + CRITERIA.decisive
-        if near and effects != own and effects not in found and judge.significant(model):
+        if near and effects != own and effects not in found and significant(model):
             if judge.explains(model, baseline):
                 found[effects] = model.fit
     return found

@@ -14,6 +14,7 @@ from .criteria import CRITERIA
 from .effects import Effect
 from .fitted import Fit
 from .judge import Judge, Model
+from .significance import significant
 
 __all__ = ["InScatter", "in_scatter"]
 
@@ -57,7 +58,7 @@ def in_scatter(judge: Judge, level: Sequence[Model], chosen: Model) -> list[InSc
         one_more = len(more) == 1 and set(chosen.effects) <= set(model.effects)
         likelier = 0.0 < chosen.criterion - model.criterion < decides
         if one_more and next(iter(more)).listed and likelier:
-            if _gone(visible, chosen, model) and judge.significant(model):
+            if _gone(visible, chosen, model) and significant(model):
                 found.setdefault(more.pop(), []).append(model)
     return [
         InScatter(

@@ -17,7 +17,7 @@ from math import comb, log
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 from scipy.stats import f as f_ratio
 
 from .criteria import CRITERIA
@@ -423,37 +423,6 @@ class Judge:
         # Half a standard error of the error itself.
         slack = 1.0 + 0.5 / np.sqrt(max(int(model.fit.used.sum()), 1))
         return bool(mine * own[0] < slack * other * own[1])
-
-    def significant(self, model: Model, fewer: Sequence[Model] = ()) -> bool:
-        """Whether every effect's amplitudes, together, are more than their standard errors.
-
-        For its shape as it was found: without the effect there would be none. What a term without
-        a formula has as a factor of the elastic law others of its numbers seem to make up for, if
-        it is large; that they cannot is seen where they were fitted without it. So is that of what
-        readings jump with, which slopes say nothing of.
-
-        Args:
-            model: the model.
-            fewer: models of one effect less.
-        """
-
-        def significant(effect: Effect, variant: Variant) -> bool:
-            own = [p.name for p in variant.amplitudes]
-
-            def beyond(known: Iterable[str]) -> bool:
-                size = model.fit.wald(own, [*known])
-                return bool(chi2.sf(size, len(own)) < 2.0 * norm.sf(CRITERIA.significant))
-
-            as_found = beyond(p.name for p in variant.shapes)
-            jumps = any(p.jumps for p in variant.amplitudes)
-            if as_found or (effect.listed and not jumps):
-                return as_found
-            kept = set(model.effects) - {effect}
-            without = [m.criterion for m in fewer if set(m.effects) == kept]
-            needed = min(without, default=-np.inf) > model.criterion + CRITERIA.decisive
-            return needed and (jumps or beyond(n for n in model.fit.values if n not in own))
-
-        return all(map(significant, model.effects, model.fit.variants))
 
     def holdout(self, model: Fit, rows: Flags | None = None) -> float:
         """Held-out error: of the holdout runs, or of each part predicted from the others.

@@ -24,14 +24,14 @@ from ...inputs.parameters import Parameter
 from ..expressions.marching import Marched, Varying
 from ..inference.effects import Effect, Variant, of_each, scaled
 from ..inference.experiment import NO_DEVIATIONS, Deviations, Readings, deviated
-from ..inference.noise import estimated_noise
-from ..inference.smoothing import mean_of, window_of
 from ..measurement.readings import common_noise, readings_of
 from ..measurement.schema import Measurement, Run
 from .crossing_moments import BASELINE, CrossingMoments
+from .of_the_fabric import of_the_fabric
 from .own_of_runs import OTHERS, Predicted, numbers_of_runs, to_own_numbers, without, zeros_of
 from .picture_frame.motion import Motion
 from .picture_frame.variant import FrameVariant
+from .ranges import LITTLE, ends_of, ranges_of
 from .recorded_rig import RecordedRig
 from .records import Records, laid_out, runs_before, typical
 from .slipping import Slips
@@ -40,9 +40,6 @@ __all__ = ["CrossheadTest"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
-
-#: Share of the largest size below which a reading on the other side of 0 is none.
-LITTLE = 0.05
 
 
 class CrossheadTest:
@@ -193,49 +190,25 @@ class CrossheadTest:
     # Data ---------------------------------------------------------------------------------
 
     def _leave_out_uncertain(self, speed_error: Array) -> None:
-        """Leave out readings whose speed is so uncertain [mm/s] that the dashpot's force is.
+        """Leave out readings that say nothing of the fabric's force; never more than half.
 
-        By more than a reading scatters, with the dashpot of a first fit, which also says how much
-        that is where it is not given; never more than half.
+        Args:
+            speed_error: of the crosshead at every reading [mm/s], (n,).
         """
         rows = self.readings.fit
-        _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
-        J = np.column_stack([slopes[p.name] for p in BASELINE])
         if rows.sum() <= len(self.baseline):
             return
-        k = np.linalg.lstsq(J[rows], self.readings.observed[rows], rcond=None)[0]
-        residual = self.readings.observed - J @ k
-        noise = self.noise or estimated_noise(residual, self.readings, rows)
+        _, slopes = self.predict((), {p.name: 0.0 for p in self.baseline})
+        J = np.column_stack([slopes[p.name] for p in BASELINE])
         known = self._kinematics(self._points, {})
         per_speed = self._recorded.at_readings(
             self._summed(known["rate_per_speed"].value, known["factor"].value)
         )
         # Where nothing is known of the rate the motion has left the reading out itself.
-        speed_error = np.where(np.isfinite(speed_error), speed_error, 0.0)
-        clear = ~(np.abs(k[-1] * per_speed * speed_error) >= noise)
-        clear &= ~self._smoothed_away(J @ k, noise)
+        uncertain = per_speed * np.where(np.isfinite(speed_error), speed_error, 0.0)
+        clear = of_the_fabric(self.readings, J, uncertain, self.noise)
         if (rows & clear).sum() > rows.sum() / 2:
             self.readings = replace(self.readings, usable=self.readings.usable & clear)
-
-    def _smoothed_away(self, expected: Array, noise: float) -> Flags:
-        """Forces that smoothing has changed by more than a reading scatters, (n,).
-
-        As where the crosshead turns, in readings that are each the mean of several: what is read
-        there is no force of the fabric.
-        """
-        forces = self.readings.first
-        rows = [forces & (self.readings.run == run) for run in range(self._count)]
-        rows = [own for own in rows if own.any()]
-        found = np.zeros(len(forces), dtype=bool)
-        read = self.readings.observed
-        # What is held out has no say in what is left out.
-        told = np.isfinite(read) & ~self.readings.holdout
-        window = window_of([read[own & told] for own in rows])
-        if window > 1:
-            for own in rows:
-                change = mean_of(expected[own], window) - expected[own]
-                found[own] = np.abs(change) >= noise
-        return found
 
     def _start(self) -> None:
         """Begin fits of the baseline with its least squares, which are linear in BASELINE."""
@@ -306,61 +279,16 @@ class CrossheadTest:
         return found
 
     def _ranges(self) -> dict[str, float]:
-        """Largest values in the fitted readings of what terms without a formula depend on.
-
-        By the names that picture_frame.terms has for them.
-        """
-        rows = self.readings.fit & self.readings.first
-
-        def most(values: Array) -> float:
-            return float(np.abs(values[rows]).max())
-
-        D, speed, time = (self._points[name].value for name in ("D", "D_rate", "time"))
-        records, crossings = self._recorded.records, self._of_crossings
-        way = records.so_far(np.abs(records.changes(D)))
+        """Sizes of what terms without a formula depend on; see ranges_of."""
+        crossings = self._of_crossings
         sheared = np.abs(crossings.changes(self._kinematics(self._points, {})["gamma"].value))
-        duration = (time[records.ends] - time[records.begins]).tolist()
-        force = float(np.abs(self._fitted_forces).max())
-        acceleration = self._recorded.acceleration.value
-        return {
-            "angle": most(self._gamma),
-            "rate": most(self._rate),
-            "path": most(self._shown(crossings.so_far(sheared))),
-            "time": most(self._recorded.at_readings(self._recorded.since_start.value)),
-            "displacement": most(self._recorded.at_readings(D)),
-            "way": most(self._recorded.at_readings(way)),
-            "speed": most(self._recorded.at_readings(speed)),
-            "acceleration": most(self._recorded.at_readings(acceleration)),
-            "force": force,
-            "force_rate": force / max(float(np.median(duration)), 1e-9),
-        }
-
-    @property
-    def _fitted_forces(self) -> Array:
-        """Forces of the runs that are fitted [N], also where a speed is not known, (n,).
-
-        What goes by the force has to reach that far in between.
-        """
-        rows = self.readings.first & ~self.readings.holdout
-        return self.readings.observed[rows & np.isfinite(self.readings.observed)]
+        path = self._shown(crossings.so_far(sheared))
+        own = {"angle": self._gamma, "rate": self._rate, "path": path}
+        return ranges_of(self._recorded, self.readings, own)
 
     def _ends(self) -> dict[str, tuple[float, float]]:
-        """Between which shares of their largest sizes signed variables of terms are."""
-        rows = self.readings.fit & self.readings.first
-        signed = {
-            "displacement": self._recorded.at_readings(self._points["D"].value)[rows],
-            "speed": self._recorded.at_readings(self._points["D_rate"].value)[rows],
-            "force": self._fitted_forces,
-            "acceleration": self._recorded.at_readings(self._recorded.acceleration.value)[rows],
-        }
-
-        def ends(values: Array) -> tuple[float, float]:
-            largest = float(np.abs(values).max())
-            shares = values / largest if largest > 0.0 else values
-            low, high = float(shares.min()), float(shares.max())
-            return (low if low < -LITTLE else 0.0), (high if high > LITTLE else 0.0)
-
-        return {name: ends(values) for name, values in signed.items()}
+        """Between which shares of their largest sizes signed ones are; see ends_of."""
+        return ends_of(self._recorded, self.readings)
 
     def predict(
         self,
