@@ -6,7 +6,7 @@ rather than one formula (friction, locking), it has several variants, and the da
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
@@ -136,6 +136,10 @@ class Effect:
     def listed(self) -> bool:
         """Whether it is an effect with a name rather than a term without a formula."""
         return not self.acts_on
+
+    def form_in(self, forms: Iterable[Variant]) -> Variant:
+        """Its form among those of a model that it is in."""
+        return next(form for form in forms if form in self.variants)
 
 
 def scaled(effect: Effect, shares: Mapping[str, float]) -> Effect:

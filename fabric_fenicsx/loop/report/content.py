@@ -93,7 +93,7 @@ def test_report(
                 d,
                 one.fit,
                 one.effect,
-                next(v for v in one.fit.variants if v in one.effect.variants),
+                one.effect.form_in(one.fit.variants),
             )
             | {
                 "gain": one.gain,
@@ -302,7 +302,7 @@ def _effects(d: Diagnosis, terms: Sequence[dict[str, Any]]) -> list[dict[str, An
 
 
 def _effect(d: Diagnosis, effect: Effect) -> dict[str, Any]:
-    variant = next(v for v in d.final.variants if v in effect.variants)
+    variant = effect.form_in(d.final.variants)
     rivals = d.rivals.get(effect.name, [])
     return _form(d, d.final, effect, variant) | {"rivals": list(rivals)}
 

@@ -66,7 +66,7 @@ def discovered_terms(d: Diagnosis, first: int = 1) -> list[Discovered]:
     """
     found: list[Discovered] = []
     for effect in (e for e in d.effects if not e.listed):
-        variant = next(v for v in d.final.variants if v in effect.variants)
+        variant = effect.form_in(d.final.variants)
         assert variant.shape is not None
         table = _shape_table(d, variant)
         about = effect.acts_on.replace("_", " ") + ": "
