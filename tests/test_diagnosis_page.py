@@ -211,12 +211,23 @@ REPORT = {
         "other_than_white": False,
         "correlation": 0.0,
         "smoothed_over": None,
+        "zeros": None,
     },
     "laboratories": [],
     "own_of_runs": False,
     "criterion": {"before": 100.0, "after": 100.0},
     "candidates": [],
+    "model": {"effects": []},
 }
+
+
+def test_the_headline_says_that_zeros_of_runs_are_noise():
+    after = {"fit": 0.05, "holdout": 0.06}
+    error = REPORT["error"] | {"before": {"fit": 0.07, "holdout": 0.2}, "after": after}
+    noise = REPORT["noise_model"] | {"zeros": 0.07}
+    said = headline(REPORT | {"error": error, "noise_model": noise})
+    assert "but for zeros of the runs, which differ as readings scatter" in said
+    assert "held-out error 0.06 N, 0.2 N without zeros" in said
 
 
 def test_the_headline_names_specimens_that_differ_beyond_doubt():

@@ -123,6 +123,7 @@ class Diagnosis:
         noise_model: of the reported model, or of the one that came nearest.
         smoothed: how the readings seem to have been smoothed; None where they do not.
         quantum: step of the values that were written; 0 where there is none.
+        zeros: of runs, root mean square, where these are noise; 0 where they are not.
         baseline: the fitted baseline.
         final: the fitted model that is reported; the baseline where nothing was added.
         best: the model that came nearest, where that is not ``final``.
@@ -176,5 +177,6 @@ class Diagnosis:
     laboratories: tuple[Laboratory, ...] = ()
     pairs: list[Pair] = field(default_factory=list)
     in_scatter: tuple[InScatter, ...] = ()
+    zeros: float = 0.0
     notes: list[str] = field(default_factory=list)
     joined: list[Joined] = field(default_factory=list)

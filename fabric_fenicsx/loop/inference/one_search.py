@@ -15,7 +15,13 @@ from collections.abc import Callable, Sequence
 
 from ..kept import Kept
 from .beside import by_itself
-from .choice import chosen_model, in_place_of, models_instead, verdict_on
+from .choice import (
+    chosen_model,
+    in_place_of,
+    models_instead,
+    verdict_on,
+    zeros_of_noise,
+)
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
 from .diagnosis import Candidate, Diagnosis, Verdict
@@ -147,11 +153,12 @@ class Search:
             noise_model=judged.estimate.variances.noise,
             smoothed=misfit.smoothed,
             quantum=quantum(self.experiment.readings, self.judge.rows),
+            zeros=zeros_of_noise(self.judge, chosen) if verdict == "no_effect" else 0.0,
             baseline=baseline.fit,
             final=final.fit,
             best=nearest.fit if verdict == "unexplained" and nearest.effects else None,
             instead=tuple(instead.values()),
-            effects=self.models.by_strength(final),
+            effects=() if verdict == "no_effect" else self.models.by_strength(final),
             rivals=rivals,
             pairs=[
                 *pairs_of(self.models, final, rivals, of_the_curve),
@@ -190,7 +197,9 @@ class Search:
             )
             verdict = verdict_on(self.judge, levels[0][0], chosen)
             if verdict not in ("effect_found", "effect_discovered"):
-                return chosen, verdict, levels[0][0], {}
+                # Zeros of runs that are noise stay with it.
+                noise = verdict == "no_effect" and bool(chosen.effects)
+                return chosen, verdict, self.models.last(chosen) if noise else levels[0][0], {}
             level = levels[len(chosen.effects)]
             final = self.models.last(chosen)
             self.progress(0.9, "rivals")
@@ -230,17 +239,16 @@ class Search:
         """
         if self.found is None:
             self.run()
-        found = self.found
-        assert found is not None
-        explained = found.verdict in ("effect_found", "effect_discovered") and self.accounted
-        if not explained or len(found.effects) != 1 or found.effects[0].listed:
+        found, model = self.found, self.chosen
+        assert found is not None and model is not None
+        explained = found.verdict != "unexplained" and self.accounted
+        if not explained or len(model.effects) != 1 or model.effects[0].listed:
             return False
         if len(nearest.effects) > 1:
-            left = nearest.fit.rms(nearest.fit.used) / found.final.rms(found.final.used)
+            left = nearest.fit.rms(nearest.fit.used) / model.fit.rms(model.fit.used)
             # A term over two variables is no simpler than two effects, and three may do as well.
-            of_two = any(effect.of_two for effect in found.effects)
-            return left > (CRITERIA.half_again if of_two else CRITERIA.enough)
-        base, variances = self.models.base, found.final.variances
+            return left > (CRITERIA.half_again if model.over_two else CRITERIA.enough)
+        base, variances = self.models.base, model.fit.variances
         linear = ToFirstOrder(self.experiment, base, variances, None)
         listed = {e: forms for e, forms in self._signatures.items() if e.listed}
         left = Screen(base, linear, listed).least_left(CRITERIA.most_effects)

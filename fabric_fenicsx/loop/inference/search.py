@@ -143,6 +143,10 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
         # Then the other one is as good, and says what there is.
         least = -CRITERIA.decisive
     gain = final.criterion - other.criterion_after
+    instead = single.chosen
+    if other.zeros and instead is not None and final.criterion - instead.criterion > least:
+        # Zeros that are noise are less of a claim than any effect.
+        return _beside(_or_several(single, further, instead.criterion), found)
     if _at_the_edge(other.final) or any(effect.of_two for effect in other.effects):
         # It may stand for another law as well as they, or is no simpler than two of them.
         least = CRITERIA.decisive

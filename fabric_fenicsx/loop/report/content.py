@@ -183,6 +183,8 @@ def noise_model(d: Diagnosis) -> dict[str, Any]:
     at_largest = noise.share * float(np.abs(readings.observed).max())
     if at_largest > noise.floor:
         words.append(f"growing by {100.0 * noise.share:.2g} % of the reading")
+    if d.zeros:
+        words.append(f"off by {d.zeros:.2g} {unit} from run to run (zeros)")
     if d.quantum > CRITERIA.said_quantum * d.noise:
         words.append(f"written in steps of {d.quantum:.3g} {unit}")
     # The model's own error, where it has one, is in what is printed and not in what is stated.
@@ -197,6 +199,7 @@ def noise_model(d: Diagnosis) -> dict[str, Any]:
         "correlation": noise.correlation,
         "quantum": d.quantum,
         "smoothed_over": None if d.smoothed is None else d.smoothed.window,
+        "zeros": d.zeros or None,
         "stated": stated,
         "other_than_stated": bool(other),
         "other_than_white": bool(words),

@@ -77,6 +77,12 @@ def _verdict(report: Mapping[str, Any]) -> str:
         if report["in_scatter"]:
             says = f"The baseline model explains the data if specimens differ{_by(report)}"
         errors = f"held-out error {before}{_foreseen(report)}; {scatter}"
+        if report["noise_model"]["zeros"]:
+            says = (
+                "The baseline model explains the data but for zeros of the runs, which differ as "
+                "readings scatter; no effect has to be added"
+            )
+            errors = f"held-out error {after}, {before} without zeros; {scatter}"
         return f"{says}: {errors}.{_if_alike(report)}"
     if report["verdict"] == "effect_found":
         names = _listed([effect["name"] for effect in report["effects"]])
@@ -291,7 +297,11 @@ def reasons(report: Mapping[str, Any]) -> list[str]:
     if own is None or not tried or report["verdict"] == "unexplained":
         return []
     if report["verdict"] == "no_effect":
-        best = min(tried, key=lambda c: float(c["criterion"]))
+        added = [effect["name"] for effect in report["model"]["effects"]]
+        others = [c for c in tried if c["name"] not in added]
+        if not others:
+            return []
+        best = min(others, key=lambda c: float(c["criterion"]))
         gain = own - best["criterion"]
         if gain < CRITERIA.decisive:
             return [
