@@ -12,7 +12,7 @@ was not; noise is what is printed. Holdout runs are looked at for that alone.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import comb, log
 
 import numpy as np
@@ -219,7 +219,7 @@ class Judge:
             way = self._smoothed(model, white)
             if way is not None:
                 # What a first order autoregression leaves of that is no structure.
-                white = replace(white, lags=way.chance, period=way.chance)
+                white = white.at_least(way.chance)
             error = self._readings.model_error
             own_error = 0.0 if error is None else np.sqrt(np.mean(np.sum(error[rows] ** 2, axis=1)))
             printed = float(np.hypot(noise, own_error))
@@ -228,7 +228,7 @@ class Judge:
 
     def _smoothed(self, model: Model, white: Whiteness) -> Smoothed | None:
         """How readings were smoothed, where noise goes together otherwise than it is taken to."""
-        if min(white.lags, white.period) > CRITERIA.structure_p:
+        if not white.structured:
             return None
         fit, readings, noise = model.fit, self._readings, model.estimate.variances.noise
         rows = fit.used

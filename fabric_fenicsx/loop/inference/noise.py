@@ -129,6 +129,11 @@ class Whiteness:
         """Something is left in the residual, whatever its size."""
         return self.least < CRITERIA.structure_p
 
+    def at_least(self, chance: float) -> Whiteness:
+        """The same where all that looks like structure is as likely as that."""
+        looks = (self.blocks, self.lags, self.period, self.smooth)
+        return Whiteness(self.size, *(max(one, chance) for one in looks))
+
 
 def steps_back(readings: Readings, rows: Flags) -> npt.NDArray[np.int_]:
     """Places from each of some readings to the one before it; 0 at the start of a line, (n,)."""
