@@ -187,11 +187,13 @@ def _true_travel(
         raise InputError(f"{place}: --effect: a term without a formula is of no other strips")
     times = np.union1d(np.linspace(0.0, duration(case), POINTS), turns(case))
     travels = np.array([crosshead(case, time) for time in times])
+    per_time = 1.0 / np.diff(times, prepend=-times[1])
     for v in forms:
         if v.travel is None:
             continue
         before = 0.0
         for k, travel in enumerate(travels):
-            before = float(v.travel(values, travel, before if v.remembers_travel else None))
+            at = {**values, "per_time": per_time[k]}
+            before = float(v.travel(at, travel, before if v.remembers_travel else None))
             travels[k] = before
     return lambda time: float(np.interp(time, times, travels))
