@@ -40,7 +40,7 @@ COUNTERPARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "quartic": ("power 4",),
     },
     "crosshead_backlash": {
-        "free": ("free on the way out",),
+        "free": ("free on the way out", "gap that the force closes"),
         "dead_zone": ("free on both sides",),
         "play": ("play",),
     },
@@ -54,6 +54,6 @@ COUNTERPARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "hyperbolic": ("hyperbolic",),
         "tanh": ("tanh",),
         "stick_slip": ("stick, then slip",),
-        "cubic": ("cubic",),
+        "cubic": ("cubic", "power"),
     },
 }
