@@ -367,7 +367,8 @@ def test_what_is_a_listed_effect_by_definition_is_found(names, left, verdict):
         return left < (1.4 if roughly else 1.25)
 
     judge = SimpleNamespace(experiment=SimpleNamespace(curves_only=False), explains=explains)
-    effects = [SimpleNamespace(name="a", listed=False, by_definition=name) for name in names]
+    of = {"name": "a", "listed": False, "acts_on": "moment", "depends_on": ("rate",)}
+    effects = [SimpleNamespace(**of, by_definition=name) for name in names]
     assert verdict_on(judge, None, SimpleNamespace(effects=effects)) == verdict
 
 

@@ -414,8 +414,8 @@ def test_three_effects_are_not_fitted_where_a_term_leaves_less_than_two(of_two, 
     assert further.accounted
     final = further.found.final
     term = linear_effect("kink", acts_on="reading")
-    effects = [replace(term, of_two=of_two)]
-    further.found = SimpleNamespace(verdict="effect_discovered", effects=effects, final=final)
+    further.found = SimpleNamespace(verdict="effect_discovered")
+    further.chosen = replace(further.chosen, effects=(replace(term, of_two=of_two),))
     two = SimpleNamespace(
         effects=("one", "other"), fit=replace(final, residual=times * final.residual)
     )

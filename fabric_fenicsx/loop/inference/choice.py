@@ -93,9 +93,11 @@ def zeros_of_noise(judge: Judge, chosen: Model) -> float:
     """
     if len(chosen.effects) != 1:
         return 0.0
-    (effect,), (form,) = chosen.effects, chosen.fit.variants
-    own = [p.run is not None for p in form.parameters]
-    if (effect.acts_on, effect.depends_on) != ("reading", ("run",)) or not all(own):
+    (effect,) = chosen.effects
+    if (effect.acts_on, effect.depends_on) != ("reading", ("run",)):
+        return 0.0
+    (form,) = chosen.fit.variants
+    if any(p.run is None for p in form.parameters):
         return 0.0
     size = float(np.sqrt(np.mean([chosen.fit.values[p.name] ** 2 for p in form.parameters])))
     return size if size <= CRITERIA.significant * judge.misfit(chosen).reading else 0.0
