@@ -26,7 +26,8 @@ def in_noise(models: Models, model: Model, terms: Sequence[Effect]) -> bool:
     A misfit that the model has for noise is what some term would have made instead of it.
 
     Args:
-        models: that terms may be in.
+        models: that the model is one of. A search for the terms begins with the same baseline, and
+            finds their sensitivities as they were asked for here.
         model: fitted, without any.
         terms: the terms.
     """

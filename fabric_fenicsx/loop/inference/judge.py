@@ -73,8 +73,8 @@ class Misfit:
             each run allowed for: what is left of readings next to each other.
         noise: that and the model's own error, where it is known to have one: what is printed.
         whiteness: tests of what the model leaves.
-        smoothed: how the readings seem to have been smoothed; None where noise is correlated in no
-            other way than the model of it has.
+        smoothed: how the readings seem to have been smoothed; None where nothing looks like
+            structure, or it is not that.
     """
 
     reading: float
@@ -227,7 +227,7 @@ class Judge:
         return self._misfits[model.fit]
 
     def _smoothed(self, model: Model, white: Whiteness) -> Smoothed | None:
-        """How readings were smoothed, where noise goes together otherwise than it is taken to."""
+        """How readings were smoothed, if what looks like structure is that."""
         if not white.structured:
             return None
         fit, readings, noise = model.fit, self._readings, model.estimate.variances.noise

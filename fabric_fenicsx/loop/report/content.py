@@ -15,7 +15,7 @@ import numpy as np
 from ...output.page import finite
 from ..inference.criteria import CRITERIA
 from ..inference.diagnosis import Diagnosis
-from ..inference.effects import Effect, Parameter, Variant
+from ..inference.effects import Effect, Parameter
 from ..inference.fitted import Fit
 from ..inference.fitting import parameters_of
 from ..inference.next_tests import NextTest, next_tests_report
@@ -89,12 +89,7 @@ def test_report(
         "noise_model": noise_model(d),
         "scatter": scatter(d.final),
         "in_scatter": [
-            _form(
-                d,
-                one.fit,
-                one.effect,
-                one.effect.form_in(one.fit.variants),
-            )
+            _form(d, one.fit, one.effect)
             | {
                 "gain": one.gain,
                 "groups": list(one.groups),
@@ -305,13 +300,11 @@ def _effects(d: Diagnosis, terms: Sequence[dict[str, Any]]) -> list[dict[str, An
 
 
 def _effect(d: Diagnosis, effect: Effect) -> dict[str, Any]:
-    variant = effect.form_in(d.final.variants)
-    rivals = d.rivals.get(effect.name, [])
-    return _form(d, d.final, effect, variant) | {"rivals": list(rivals)}
+    return _form(d, d.final, effect) | {"rivals": list(d.rivals.get(effect.name, []))}
 
 
-def _form(d: Diagnosis, model: Fit, effect: Effect, variant: Variant) -> dict[str, Any]:
-    std = _std(d, model)
+def _form(d: Diagnosis, model: Fit, effect: Effect) -> dict[str, Any]:
+    variant, std = effect.form_in(model.variants), _std(d, model)
     names = [p.name for p in variant.parameters]
     return {
         "name": effect.name,
@@ -330,7 +323,7 @@ def _std(d: Diagnosis, model: Fit) -> dict[str, float | None]:
 def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:
     """All numbers of a fitted model and what it leaves."""
     forms = [
-        _form(d, model, effect, variant)
+        _form(d, model, effect)
         for variant in model.variants
         for effect in (*d.experiment.effects, *d.experiment.terms)
         if variant in effect.variants
