@@ -12,14 +12,9 @@ from scipy.stats import multivariate_normal
 from fabric_fenicsx.loop.inference import variances
 from fabric_fenicsx.loop.inference.criteria import CRITERIA
 from fabric_fenicsx.loop.inference.fitting import fit, linearised
+from fabric_fenicsx.loop.inference.likelihood import Likelihood, Linearised
 from fabric_fenicsx.loop.inference.noise import Noise
-from fabric_fenicsx.loop.inference.variances import (
-    Linearised,
-    Variances,
-    _Problem,
-    averaged,
-    estimate,
-)
+from fabric_fenicsx.loop.inference.variances import Variances, averaged, estimate
 
 #: Of −2 log likelihood that the search leaves: nothing, to what is known of components.
 NEARLY = 0.1
@@ -148,7 +143,7 @@ def test_the_likelihoods_are_those_of_dense_matrices(smooth, given, errs):
 @pytest.mark.parametrize("of", [0, 1])
 def test_slopes_of_the_likelihoods_are_their_difference_quotients(of, smooth, errs):
     at = uncertain(example()) if errs else example()
-    problem = _Problem(at, 0.5, smooth, 0.3)
+    problem = Likelihood(at, 0.5, smooth, 0.3)
     problem.floor, problem.of = 0.37, of
     inside = np.array([0.1, 0.4, 2.0, 3.0, 1.0, *[0.7] * smooth])
     on_bounds = np.array([0.1, 0.0, 0.0, 0.0, 0.0, *[0.0] * smooth])

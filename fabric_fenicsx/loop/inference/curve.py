@@ -18,7 +18,8 @@ import numpy.typing as npt
 from scipy.interpolate import BSpline
 
 from .experiment import OneCurve, Readings
-from .variances import Linearised, Variances, estimate
+from .likelihood import Linearised
+from .variances import Variances, estimate
 
 __all__ = ["Curve", "smooth_curve"]
 

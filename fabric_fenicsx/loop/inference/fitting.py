@@ -19,7 +19,8 @@ from .criteria import CRITERIA
 from .effects import Parameter, Variant
 from .experiment import Experiment, Flags
 from .fitted import Fit, uncertainty
-from .variances import Linearised, Variances
+from .likelihood import Linearised
+from .variances import Variances
 
 __all__ = [
     "fit",

@@ -25,12 +25,12 @@ from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitted import Fit
 from .fitting import groups_of, linearised
+from .likelihood import Linearised
 from .noise import Noise, Whiteness, missed_readings, outliers, steps_back, whiteness
 from .smoothing import Smoothed, smoothed
 from .validation import CrossValidation, cross_validated, parts_by, stretches
 from .variances import (
     Estimate,
-    Linearised,
     Variances,
     averaged,
     chance_of_no_misfit,
