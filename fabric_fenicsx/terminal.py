@@ -146,7 +146,6 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
         model = part["model"]
         found = [*part["effects"], *part["beside"], *part["discovered"]]
         for effect in [{"name": "baseline", **part["baseline"]}, *found]:
-            # The baseline's as they are in the model that is reported.
             for k, name in enumerate(effect["parameters"]):
                 table.add_row(
                     "" if k else effect["name"],

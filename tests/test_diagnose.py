@@ -94,8 +94,15 @@ def test_the_report_keeps_the_contract(diagnosed, name):
     for candidate in report["candidates"]:
         assert {"score", "p_value", "error_fit", "error_holdout"} < set(candidate)
         assert 0.0 <= candidate["p_value"] <= 1.0
-    assert set(report["baseline"]) == {"parameters", "std"}
-    assert set(report["baseline"]["parameters"]) == {"k1_N", "k3_N", "c1_N_s"}
+    names = {"k1_N", "k3_N", "c1_N_s"}
+    for key in ("baseline", "baseline_alone"):
+        assert set(report[key]) == {"parameters", "std"}
+        assert set(report[key]["parameters"]) == set(report[key]["std"]) == names
+    # With what was found beside them, and without.
+    for kind in ("parameters", "std"):
+        refitted = {name: report["model"][kind][name] for name in names}
+        assert report["baseline"][kind] == refitted
+    assert (report["baseline"] == report["baseline_alone"]) == (verdict != "effect_found")
     error = report["error"]
     assert error["quantity"] == "force_N"
     for number in (*error["before"].values(), *error["after"].values(), error["noise"]):

@@ -78,7 +78,9 @@ def test_report(
             if c.effect.listed or c.fit is not None
         ],
         "criterion": {"before": d.criterion_before, "after": d.criterion_after},
-        "baseline": {"parameters": d.baseline.values, "std": _std(d, d.baseline)},
+        # What the fabric has is told by the model that is reported, beside what that found.
+        "baseline": _of_the_baseline(d, d.final),
+        "baseline_alone": _of_the_baseline(d, d.baseline),
         "error": {
             "quantity": d.experiment.quantity,
             "before": {"fit": d.baseline.rms(rows), "holdout": d.holdout_before},
@@ -318,6 +320,13 @@ def _form(d: Diagnosis, model: Fit, effect: Effect) -> dict[str, Any]:
 def _std(d: Diagnosis, model: Fit) -> dict[str, float | None]:
     """Standard errors; None of a parameter on a bound, where there is none."""
     return {name: None if name in model.at_bound else value for name, value in model.errors.items()}
+
+
+def _of_the_baseline(d: Diagnosis, model: Fit) -> dict[str, Any]:
+    """The baseline's parameters as they are in a model."""
+    values, std = model.values, _std(d, model)
+    names = list(d.baseline.values)
+    return {"parameters": {n: values[n] for n in names}, "std": {n: std[n] for n in names}}
 
 
 def _numbers(d: Diagnosis, model: Fit, holdout: float) -> dict[str, Any]:

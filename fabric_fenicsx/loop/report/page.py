@@ -258,7 +258,7 @@ def _parameter_rows(report: Mapping[str, Any]) -> list[dict[str, Any]]:
                     "name": name,
                     "value": report["model"]["parameters"][name],
                     "std": report["model"]["std"][name],
-                    "alone": report["baseline"]["parameters"].get(name),
+                    "alone": report["baseline_alone"]["parameters"].get(name),
                     **report["parameters"][name],
                 }
             )
