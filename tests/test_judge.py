@@ -182,10 +182,13 @@ def test_slow_noise_is_doubted_sooner_beside_an_effect(correlation, beside, alon
         slow = replace(model, estimate=replace(model.estimate, variances=variances))
         assert judge.doubtful_noise(slow) == bool(beside)
         assert judge.doubtful_noise(replace(slow, effects=())) == bool(alone)
+        # A term is asked for as soon as that where nothing was found.
+        assert judge.may_hide_a_term(replace(slow, effects=())) == bool(beside)
+        assert judge.may_hide_a_term(slow) == bool(beside)
         # Whatever is in it.
         assert judge.slow_noise(slow) == bool(alone)
         judge.given = SIGMA
-        assert not judge.slow_noise(slow)
+        assert not judge.slow_noise(slow) and not judge.may_hide_a_term(replace(slow, effects=()))
 
 
 @pytest.mark.parametrize(("truth", "found"), [("two", {"wave", "step"}), ("both", {"both"})])

@@ -61,7 +61,8 @@ class Criteria:
         stated_within: relative sigma of a noise that was stated; convention.
         slow_noise: correlation of neighbouring readings beyond which noise looks like a misfit;
             convention.
-        slow_beside: ... beside effects, which may not be all, or not the best; made-up.
+        slow_beside: ... beside effects, which may not be all, or not the best, and beyond which a
+            term is asked for where nothing was found and no noise was stated; made-up.
         readings_per_knot, most_knots: of the smooth line that a misfit is looked for with;
             convention.
         blocks: parts, of several stretches each, that are left out in turn where there is one run;

@@ -253,6 +253,16 @@ class Judge:
             return slow and self.misfit(model).smoothed is None
         return self.misfit(model).reading > CRITERIA.scatter * self.given
 
+    def may_hide_a_term(self, model: Model) -> bool:
+        """Whether a term is asked for in what a model takes for noise.
+
+        Where noise is doubtful, or all that was not stated of a baseline's goes together from
+        reading to reading: so would a misfit, be it called slow noise or smoothed readings.
+        """
+        alone = self.given is None and not model.effects
+        together = model.estimate.variances.noise.correlation > CRITERIA.slow_beside
+        return (alone and together) or self.doubtful_noise(model)
+
     def may_hide_another(self, model: Model) -> bool:
         """Whether an effect may hide in what a model of terms takes for noise or for specimens.
 

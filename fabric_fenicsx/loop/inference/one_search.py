@@ -80,8 +80,8 @@ class Search:
         self.accounted = False
         #: That model.
         self.chosen: Model | None = None
-        #: Whether noise is more than was stated for that, or slow.
-        self.doubtful_noise = False
+        #: Whether noise is more than was stated for that, or slow; and whether a term is asked for.
+        self.doubtful_noise = self.may_hide_a_term = False
         #: Whether specimens differ in it; and whether a further effect may be in that, or in noise.
         self.specimens_differ = self.may_be_more = False
         #: Models of one effect, the best first.
@@ -123,6 +123,7 @@ class Search:
         chosen, verdict, final, in_their_place = self._chosen_of(levels)
         self.accounted = self.judge.accounts(chosen, baseline)
         self.doubtful_noise = self.judge.doubtful_noise(chosen)
+        self.may_hide_a_term = self.judge.may_hide_a_term(chosen)
         self.specimens_differ = bool(chosen.fit.deviations)
         self.may_be_more = chosen.over_two or self.may_be_one_more(chosen)
         if self._screened_first:

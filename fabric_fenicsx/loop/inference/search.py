@@ -105,7 +105,7 @@ def _doubt(search: Search, further: Search) -> _Doubt | None:
         # Several effects with names may imitate a single one that has none.
         return _Doubt(single, -CRITERIA.decisive, False)
     hidden = not own and further.may_be_one_more(chosen)
-    if rivals or hidden or (search.doubtful_noise and in_noise(search.models, chosen, single)):
+    if rivals or hidden or (search.may_hide_a_term and in_noise(search.models, chosen, single)):
         # Before noise is said to be more than was stated, or as slow as a misfit, or specimens to
         # differ, terms are tried.
         terms = [t for t in experiment.terms if not set(own) & set(t.general_form_of)]
