@@ -338,6 +338,19 @@ def test_a_term_may_hide_in_noise_that_goes_together(hidden):
     assert in_noise(own.models, model, terms) is hidden
 
 
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_term_is_asked_for_where_nothing_was_found(monkeypatch, asked):
+    """Though the baseline explains what there is, if its noise may hide one."""
+    test = made({"wave": lambda t: np.sin(9.0 * t)}, lambda t: 0.05 * np.sin(9.0 * t), [])
+    test.terms = [linear_effect("wave", acts_on="reading")]
+    monkeypatch.setattr(Judge, "explains", lambda *of, **how: True)
+    monkeypatch.setattr(Judge, "accounts", lambda *of: True)
+    monkeypatch.setattr(Judge, "may_hide_a_term", lambda *of: asked)
+    found = diagnose_test(test)
+    assert [effect.name for effect in found.effects] == ["wave"] * asked
+    assert found.verdict == ("effect_discovered" if asked else "no_effect")
+
+
 @pytest.mark.parametrize(("apart", "name"), [(0.0, "kink"), (0.4, "product")])
 def test_what_differs_between_specimens_may_go_by_two_variables(apart, name):
     """A term that leaves noise only as its specimens are unusually different is not the last."""

@@ -1,10 +1,8 @@
 """Readings that were smoothed before they were handed on."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from linear import Linear, readings
-from measurements.sets import sixty
 from scipy.signal import lfilter, savgol_filter
 from test_in_scatter import C1, FRICTION, NOISE, force, there_and_back, write
 
@@ -12,10 +10,8 @@ from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.noise import Noise
-from fabric_fenicsx.loop.inference.search import diagnose_test
 from fabric_fenicsx.loop.inference.smoothing import mean_of, smoothed, window_of
 from fabric_fenicsx.loop.inference.variances import Variances
-from fabric_fenicsx.loop.kinds.cantilever.model import Cantilever
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 
 COUNTS = (120, 90, 150, 140)
@@ -170,19 +166,3 @@ def test_what_was_smoothed_at_a_turn_is_not_compared(tmp_path, window):
     report = diagnose([measured], effects=("crossover_friction", "rate_hardening")).report
     assert report["noise_model"]["smoothed_over"] == (window if window > 1 else None)
     assert report["verdict"] == "effect_found"
-
-
-def test_a_board_that_bows_is_not_taken_for_smoothed_readings(tmp_path):
-    """Noise that nobody stated, of neighbours that go together: a term is asked for."""
-    recipe = next(one for one in sixty(5) if one.name == "none-bending-undeclared")
-    sigma = recipe(tmp_path / "set").noise
-    for path in (tmp_path / "set").glob("*.csv"):
-        table = pd.read_csv(path)
-        table["z_mm"] += 5.0 * sigma * np.exp(-(((table["x_mm"] - 70.0) / 25.0) ** 2))
-        table.to_csv(path, index=False)
-    found = diagnose_test(Cantilever([read_measurement(tmp_path / "set")]))
-    assert found.verdict == "effect_discovered"
-    (effect,) = found.effects
-    assert (effect.acts_on, effect.depends_on) == ("reading", ("distance",))
-    # As the baseline alone has it, all of that is noise.
-    assert found.noise < 1.3 * sigma < 0.7 * found.baseline.variances.noise.floor
