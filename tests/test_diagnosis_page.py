@@ -340,3 +340,20 @@ def test_reasons_stand_where_a_rival_has_a_smaller_error():
     assert headline(unexplained | {"error": far}).startswith("The residual is not noise")
     (vetoed,) = reasons(REPORT | {"candidates": [candidate("vetoed", 0.04, 0.04, 60.0)]})
     assert vetoed.startswith("vetoed gains 40.0, but")
+
+
+@pytest.mark.parametrize(
+    ("stated", "correlation", "smoothed_over", "said"),
+    [
+        (None, 0.1, None, ""),
+        (None, 0.5, None, "Nobody has stated it"),
+        (None, 0.5, 3, ""),
+        (0.05, 0.5, None, ""),
+        (0.05, 0.9, None, "Noise as slow as that"),
+        (None, 0.9, None, "Noise as slow as that"),
+    ],
+)
+def test_noise_that_may_be_a_misfit_is_said_to_be(stated, correlation, smoothed_over, said):
+    noise = {"correlation": correlation, "smoothed_over": smoothed_over, "stated": stated}
+    text = headline(REPORT | {"noise_model": REPORT["noise_model"] | noise})
+    assert said in text and text.endswith("misfit of the model.") == bool(said)

@@ -270,8 +270,16 @@ def _noise(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"Readings scatter by other than the {_value(report, noise['stated'])} stated."
     if noise["other_than_white"]:
         yield f"The noise is {noise['words']}."
-    if noise["correlation"] > CRITERIA.slow_noise and noise["smoothed_over"] is None:
+    if noise["smoothed_over"] is not None:
+        return
+    if noise["correlation"] > CRITERIA.slow_noise:
         yield "Noise as slow as that cannot be told from a smooth misfit of the model."
+    elif (
+        report["verdict"] == "no_effect"
+        and noise["stated"] is None
+        and noise["correlation"] > CRITERIA.slow_beside
+    ):
+        yield "Nobody has stated it, and some of it may be a smooth misfit of the model."
 
 
 def _laboratories(report: Mapping[str, Any]) -> Iterator[str]:
