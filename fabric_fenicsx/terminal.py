@@ -143,15 +143,14 @@ def summarise_diagnosis(report: dict[str, Any], folder: Any) -> None:
         table = Table()
         for heading in ("", "parameter", "value", "±", "unit"):
             table.add_column(heading, no_wrap=True, overflow="fold")
-        model = part["model"]
         found = [*part["effects"], *part["beside"], *part["discovered"]]
         for effect in [{"name": "baseline", **part["baseline"]}, *found]:
-            for k, name in enumerate(effect["parameters"]):
+            for k, (name, value) in enumerate(effect["parameters"].items()):
                 table.add_row(
                     "" if k else effect["name"],
                     name,
-                    _shown(model["parameters"][name]),
-                    _shown(model["std"][name]),
+                    _shown(value),
+                    _shown(effect["std"][name]),
                     part["parameters"][name]["unit"],
                 )
         if table.row_count:

@@ -256,8 +256,8 @@ class Judge:
     def may_hide_a_term(self, model: Model) -> bool:
         """Whether a term is asked for in what a model takes for noise.
 
-        Where noise is doubtful, or all that was not stated of a baseline's goes together from
-        reading to reading: so would a misfit, be it called slow noise or smoothed readings.
+        Where noise is doubtful, or was not stated and goes together from reading to reading beside
+        the baseline: so would a misfit, be it taken for slow noise or for smoothed readings.
         """
         alone = self.given is None and not model.effects
         together = model.estimate.variances.noise.correlation > CRITERIA.slow_beside
