@@ -84,6 +84,11 @@ CASES = {
         {"compliance": 20.0 / B, "yielding": (0.3 * B * CRITICAL, 0.5)},
     ),
     "tilt": (("clamp_tilt", "constant"), {"tilt_rad": -0.1}, {"tilt": -0.1}),
+    "tilt about a pivot": (
+        ("clamp_tilt", "about a pivot behind its edge"),
+        {"tilt_rad": -0.1, "pivot_mm": 20.0},
+        {"tilt": -0.1, "lifted": -0.1 * 20.0},
+    ),
 }
 
 

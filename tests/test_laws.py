@@ -140,13 +140,15 @@ def test_stored_energy_is_the_work_of_the_moment(law, gamma):
     assert stored == pytest.approx(work, rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("cubic", [0.0, 1e-3, 2.0, 50.0])
-def test_energy_of_a_relaxing_branch(cubic):
+@pytest.mark.parametrize(
+    ("cubic", "flow"), [(0.0, 0.0), (1e-3, 0.0), (2.0, 0.0), (50.0, 0.0), (0.0, 0.1), (2.0, 0.1)]
+)
+def test_energy_of_a_relaxing_branch(cubic, flow):
     """Loaded at once and let go at once it is elastic; on any path its dashpot only loses.
 
     At once, M = k (γ + c γ³): ψ = k (γ²/2 + c γ⁴/4).
     """
-    law = LAWS["maxwell"](3.0, 5.0, cubic)
+    law = LAWS["maxwell"](3.0, 5.0, cubic, flow)
     gamma = 0.6
     at = crossing(gamma, per_time=1e9)
     stored, _ = law.energy_and_loss(at, law.moment(at))
@@ -573,6 +575,7 @@ def test_units_of_the_keys_of_laws():
     rows = {row.name: row for row in documented(DrapeCase)}
     for key, unit in {
         "maxwell].cubic_1_rad2": "1/rad²",
+        "maxwell].flow_deg": "°",
         "maxwell].relaxation_time_s": "s",
         "sliding_friction].growth_1_rad": "1/rad",
         "sliding_friction].rounding_rad_s": "rad/s",

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from ufl import as_ufl, as_vector
 
 from fabric_fenicsx.fabric.net import Net
@@ -152,6 +153,41 @@ def test_maxwell(steps):
     peak = k * rate * tau * (1.0 - np.exp(-time / tau))
     assert M[steps - 1] == pytest.approx(peak)
     assert M[-1] == pytest.approx(peak * np.exp(-time / tau))
+
+
+@pytest.mark.parametrize("flow", [0.004, 0.05, 50.0])
+@pytest.mark.parametrize("cubic", [0.0, 2.0])
+def test_maxwell_whose_dashpot_gives_way(flow, cubic):
+    """Against dα/dt = df/dt − (α₀/τ) sinh(α/α₀) by Runge and Kutta: there, a hold, back, another.
+
+    Each is one step of a constant rate, which f has where the angle does as well for c = 0 alone:
+    the angles here are those at which f goes evenly.
+    """
+    k, tau, time = 4.0, 8.0, 3.0
+    turns = [0.5, 0.5, -0.3, -0.3, -0.31]
+    grown = [gamma + cubic * gamma**3 for gamma in turns]
+    stretch, expected = 0.0, []
+    for before, after in pairwise([0.0, *grown]):
+        rate = (after - before) / time
+        step = solve_ivp(
+            lambda _, a, rate=rate: rate - flow / tau * np.sinh(a / flow),
+            (0.0, time),
+            [stretch],
+            method="LSODA",
+            rtol=1e-10,
+            atol=1e-13,
+        )
+        stretch = step.y[0, -1]
+        expected.append(k * stretch)
+    M = moments(Maxwell(k, tau, cubic, flow), turns, length=time)
+    assert M == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_maxwell_that_hardly_gives_way():
+    """Stretches far below α₀ are those of a linear dashpot."""
+    turns = [0.3, 0.3, -0.2]
+    linear, other = (moments(Maxwell(4.0, 8.0, 0.0, flow), turns) for flow in (0.0, 300.0))
+    assert other == pytest.approx(linear, rel=1e-6)
 
 
 def test_coulomb_friction():

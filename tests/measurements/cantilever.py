@@ -36,6 +36,7 @@ class Strip:
     compliance: float = 0.0  # rad per N mm/mm: root rotation per moment per width
     taper: float = 0.0  # thickness h(s)/h(0) - 1 at the free end
     tip_weight: float = 0.0  # N/mm
+    lifted: float = 0.0  # mm, the clamp's edge
     # Moment [N] beyond which it is a power of the moment, and which one.
     yielding: tuple[float, float] = (1.0, 1.0)
 
@@ -144,7 +145,7 @@ def hang(strip: Strip) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     for f in (np.cos, np.sin):
         legs = step / 6 * (f(slope[1:]) + 4 * f(middle) + f(slope[:-1]))
         place.append(np.concatenate([[0], np.cumsum(legs[:, 0])]))
-    return s, place[0], place[1], moment[:, 0]
+    return s, place[0], strip.lifted + place[1], moment[:, 0]
 
 
 _TABLE: list[RectBivariateSpline] = []

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ufl import exp, sinh, sqrt
+from ufl import exp, ln, sinh, sqrt, tanh
 
 from ...inputs.groups import NotNegative
 from ...inputs.parameters import Parameter
-from .law import Crossing, CrossingLaw, Form, Times, asinh, number, per_area
+from .law import Crossing, CrossingLaw, Form, Times, asinh, in_degrees, number, per_area
 
 __all__ = ["Maxwell"]
 
@@ -26,6 +26,15 @@ SHORTEST = Parameter(
     meaning="shortest relaxation time",
     share_of="duration",
     essential=True,
+)
+
+FLOW = Parameter(
+    "flow_rad",
+    (0.05, 0.2),
+    0.005,
+    2.0,
+    meaning="stretch beyond which its dashpot gives way",
+    share_of="angle",
 )
 
 
@@ -68,10 +77,14 @@ class Maxwell(CrossingLaw):
 
     is how far F lies above its tangent at g: never negative, and k α²/2 for c = 0.
 
+    Where what slides does so by thermal activation, α̇ = f˙ − (α₀/τ) sinh(α/α₀) (H. Eyring, J. Chem.
+    Phys. 4, 1936): up to stretches of α₀ the same, and beyond little more with any rate.
+
     Attributes:
         stiffness: k [N mm].
         relaxation_time: τ [s].
         cubic: c [1/rad²], which stiffens the spring; 0 for the usual linear one.
+        flow: α₀ [rad] of a dashpot that gives way; 0 for the usual linear one.
     """
 
     stiffness: Any = per_area("k_N_mm", "stiffness per area")
@@ -79,6 +92,9 @@ class Maxwell(CrossingLaw):
         "relaxation_time_s", "time in which the moment falls to 1/e in a hold"
     )
     cubic: Any = number("cubic_1_rad2", "c of the spring's γ + c γ³", NotNegative, 0.0)
+    flow: Any = in_degrees(
+        "flow_deg", "α₀ of a dashpot α₀/τ sinh(α/α₀), 0 for a linear one", NotNegative, 0.0
+    )
 
     law = "maxwell"
     name = "Maxwell branch"
@@ -88,6 +104,11 @@ class Maxwell(CrossingLaw):
             "crossover_relaxation",
             "one branch, cubic",
             (_branch("", (0.01, 0.03, 0.1, 0.3)) | {"cubic": CUBIC},),
+        ),
+        Form(
+            "crossover_relaxation",
+            "one branch that gives way",
+            (_branch("", (0.03, 0.3)) | {"flow": FLOW},),
         ),
         Form(
             "crossover_relaxation",
@@ -123,8 +144,27 @@ class Maxwell(CrossingLaw):
         return k * (above - v * (gamma - g))
 
     def _stretch(self, at: Crossing) -> Any:
-        """α_n e^(−h/τ) + Δ(γ + c γ³) τ/h (1 − e^(−h/τ)): exact for a constant rate."""
+        """α at the end of the step, exact for a constant rate of f."""
         tau = at.number(self.relaxation_time)
-        decay = exp(-1 / (tau * at.per_time))
-        cubic = at.number(self.cubic) * (at.gamma**3 - at.gamma_n**3)
-        return at.past("angle") * decay + (at.change + cubic) * at.per_time * tau * (1 - decay)
+        rate = at.change + at.number(self.cubic) * (at.gamma**3 - at.gamma_n**3)
+        rate *= at.per_time
+        if isinstance(self.flow, float) and self.flow == 0.0:
+            decay = exp(-1 / (tau * at.per_time))
+            return at.past("angle") * decay + rate * tau * (1 - decay)
+        return self._given_way(at, rate, 1 / tau)
+
+    def _given_way(self, at: Crossing, rate: Any, per_tau: Any) -> Any:
+        """Of an Eyring dashpot: u = tanh(α/2α₀) goes by u̇ = a/2 (1 − u²) − u/τ, a = f˙/α₀.
+
+        With λ² = a² + 1/τ², t = tanh(λh/2) and e = e^(α/2α₀), of e² = (1 + u)/(1 − u):
+
+            e² at the end = (e (λ + a t) + t/(τ e)) / ((λ − a t)/e + e t/τ)
+        """
+        limit = at.number(self.flow)
+        a = rate / limit
+        size = sqrt(a**2 + per_tau**2)
+        t = tanh(size / (2 * at.per_time))
+        e = exp(at.past("angle") / (2 * limit))
+        above = e * (size + a * t) + per_tau * t / e
+        below = (size - a * t) / e + per_tau * t * e
+        return limit * ln(above / below)

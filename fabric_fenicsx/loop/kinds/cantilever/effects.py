@@ -91,6 +91,11 @@ EXPONENT = Parameter(
     "clamp_exponent", (0.5, 2.0), 0.2, 4.0, meaning="power of larger ones that it yields by"
 )
 
+TILT = Parameter("tilt_rad", amplitude=True, meaning="slope of the clamp, up positive")
+PIVOT = Parameter(
+    "pivot_mm", (15.0,), 0.0, 60.0, meaning="how far behind its edge it turns, which lifts the edge"
+)
+
 
 def _by_a_power(p: Values, root: Any) -> Any:
     """A turn that is linear in small moments: c M (1 + (M/m)²)^((n − 1)/2)."""
@@ -159,8 +164,14 @@ CANTILEVER_EFFECTS = (
         (
             StripVariant(
                 "constant",
-                (Parameter("tilt_rad", amplitude=True, meaning="slope of the clamp, up positive"),),
+                (TILT,),
                 slope=lambda p, root: p["tilt_rad"],
+            ),
+            StripVariant(
+                "about a pivot behind its edge",
+                (TILT, PIVOT),
+                slope=lambda p, root: p["tilt_rad"],
+                camera=lambda p, at: (0.0, p["tilt_rad"] * p["pivot_mm"]),
             ),
         ),
         of_fabric=False,
