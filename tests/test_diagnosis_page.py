@@ -226,7 +226,7 @@ def test_the_headline_says_that_zeros_of_runs_are_noise():
     error = REPORT["error"] | {"before": {"fit": 0.07, "holdout": 0.2}, "after": after}
     noise = REPORT["noise_model"] | {"zeros": 0.07}
     said = headline(REPORT | {"error": error, "noise_model": noise})
-    assert "but for zeros of the runs, which differ as readings scatter" in said
+    assert "but for zeros of the runs, which scatter about nothing" in said
     assert "held-out error 0.06 N, 0.2 N without zeros" in said
 
 

@@ -180,6 +180,20 @@ def test_a_load_cell_of_each_run_without_a_held_out_run():
         assert abs(values[f"run{number}_offset_N"] - offset) < 4.0 * std[f"run{number}_offset_N"]
 
 
+@pytest.mark.parametrize(
+    ("zeros", "names"), [((0.3, -0.1, -0.2), []), ((0.3, 0.3, 0.3), ["load_drift"])]
+)
+def test_zeros_of_runs_about_nothing_are_noise_and_to_one_side_an_offset(zeros, names):
+    found = diagnosed(added=lambda run, t: zeros[run])
+    assert [e.name for e in found.effects] == names
+    assert found.verdict == ("effect_found" if names else "no_effect")
+    fitted = [zeros[0], zeros[2]]
+    assert found.zeros == pytest.approx(0.0 if names else np.hypot(*fitted) / 2**0.5, abs=0.02)
+    assert found.rivals.keys() == set(names)
+    assert found.holdout_before > 3.0 * SIGMA
+    assert found.holdout_after < 1.15 * SIGMA
+
+
 def test_a_run_not_fitted_has_a_zero_of_its_own_where_the_fitted_one_hardly_has():
     # What drifts in one run may begin anywhere in another: its error tests the force's shape.
     lines = ((0.0, -0.02), (0.4, -0.015), (-0.3, 0.01))

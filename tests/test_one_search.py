@@ -11,8 +11,7 @@ from scipy.signal import lfilter
 from fabric_fenicsx.errors import SolveError
 from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference import one_search, several
-from fabric_fenicsx.loop.inference.choice import verdict_on, zeros_of_noise
-from fabric_fenicsx.loop.inference.effects import Effect, Variant, of_run
+from fabric_fenicsx.loop.inference.effects import Effect, Variant
 from fabric_fenicsx.loop.inference.experiment import NO_DEVIATIONS
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.hidden import in_noise
@@ -286,31 +285,6 @@ def test_what_specimens_visibly_differ_by_may_be_a_further_effect(own_way, apart
     assert model.fit.deviations
     assert own._settled(model, without) is settled
     assert own.may_be_one_more(model) is not settled
-
-
-@pytest.mark.parametrize(("sigmas", "verdict"), [(1.2, "no_effect"), (4.0, "effect_discovered")])
-def test_zeros_of_runs_that_differ_as_readings_scatter_are_noise(monkeypatch, sigmas, verdict):
-    """Where they are all that lacks, larger ones are a claim."""
-    numbers = np.repeat(np.arange(RUNS), EACH)
-    own = [of_run(Parameter("zero", amplitude=True), k) for k in range(1, RUNS)]
-    columns = {p.name: lambda t, k=p.run: (numbers == k).astype(float) for p in own}
-    term = replace(linear_effect("zeros", *own, acts_on="reading"), depends_on=("run",))
-    offsets = 0.02 * sigmas * np.array([0.0, 1.0, -1.0, 0.8])
-    alike = np.zeros(RUNS * EACH, dtype=np.int64)
-    test = made(columns, lambda t: offsets[numbers], [term], specimen=alike)
-    judge, rows = Judge(test, [term]), test.readings.fit
-    without, model = (
-        judge.weighed(fit(test, forms, {"a": 10.0, "b": 2.0, **zeros}, rows, Variances(NOISE)), of)
-        for forms, zeros, of in (
-            ((), {}, ()),
-            (term.variants, {p.name: 0.0 for p in own}, (term,)),
-        )
-    )
-    # The zero of a run that is left out is known to a rig, from its own readings.
-    monkeypatch.setattr(Judge, "explains", lambda *of, **how: True)
-    assert verdict_on(judge, without, model) == verdict
-    size = np.sqrt(np.mean(offsets[1:] ** 2)) if verdict == "no_effect" else 0.0
-    assert zeros_of_noise(judge, model) == pytest.approx(size, abs=0.005)
 
 
 @pytest.mark.parametrize("hidden", [False, True])

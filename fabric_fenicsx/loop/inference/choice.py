@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-import numpy as np
-
 from .criteria import CRITERIA
 from .diagnosis import Verdict
 from .effects import Effect
@@ -13,7 +11,7 @@ from .fitted import Fit
 from .judge import Judge, Model
 from .significance import significant
 
-__all__ = ["chosen_model", "in_place_of", "models_instead", "verdict_on", "zeros_of_noise"]
+__all__ = ["chosen_model", "in_place_of", "models_instead", "verdict_on"]
 
 
 def chosen_model(
@@ -81,26 +79,7 @@ def verdict_on(judge: Judge, baseline: Model, chosen: Model) -> Verdict:
         return "effect_found"
     if all(e.listed for e in chosen.effects) or not judge.explains(chosen, baseline, roughly=True):
         return "unexplained"
-    # Readings whose zeros differ as they scatter anyhow are noise.
-    return "no_effect" if zeros_of_noise(judge, chosen) else "effect_discovered"
-
-
-def zeros_of_noise(judge: Judge, chosen: Model) -> float:
-    """What the zeros of runs are, root mean square, where a model has these alone.
-
-    And they are no more than twice what a reading scatters by, in which case they are as much a
-    matter of the readings as that; 0 where it is not so.
-    """
-    if len(chosen.effects) != 1:
-        return 0.0
-    (effect,) = chosen.effects
-    if (effect.acts_on, effect.depends_on) != ("reading", ("run",)):
-        return 0.0
-    (form,) = chosen.fit.variants
-    if any(p.run is None for p in form.parameters):
-        return 0.0
-    size = float(np.sqrt(np.mean([chosen.fit.values[p.name] ** 2 for p in form.parameters])))
-    return size if size <= CRITERIA.significant * judge.misfit(chosen).reading else 0.0
+    return "effect_discovered"
 
 
 def models_instead(

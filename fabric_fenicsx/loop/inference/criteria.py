@@ -44,8 +44,7 @@ class Criteria:
             tried in its place; convention (likewise: strong evidence).
         significant: standard errors that an amplitude must be from nothing, times what is expected
             that a held-out error may be, times what the baseline expects of it that a model may,
-            times what was stated that noise may be, and times a reading's noise that zeros of runs
-            are noise up to; convention.
+            times what was stated that noise may be; convention.
         near: error over noise up to which a model explains what it was fitted to, and what it was
             not, if the residual has structure; made-up.
         roughly: ... up to which terms without a formula, whose shapes are not the law itself,

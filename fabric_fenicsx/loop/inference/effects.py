@@ -72,12 +72,14 @@ class Variant:
         shape: of a term without a formula; None of what has one.
         factor_of: of a term that is a factor, a variable that it is a factor of; empty where that
             is none that terms depend on.
+        zeros: the parameters are what is read of each run where there is nothing to be read.
     """
 
     label: str
     parameters: tuple[Parameter, ...]
     shape: Shape | None = field(default=None, kw_only=True)
     factor_of: str = field(default="", kw_only=True)
+    zeros: bool = field(default=False, kw_only=True)
 
     @property
     def amplitudes(self) -> tuple[Parameter, ...]:

@@ -20,7 +20,6 @@ from .choice import (
     in_place_of,
     models_instead,
     verdict_on,
-    zeros_of_noise,
 )
 from .criteria import CRITERIA
 from .curve import Curve, smooth_curve
@@ -154,12 +153,11 @@ class Search:
             noise_model=judged.estimate.variances.noise,
             smoothed=misfit.smoothed,
             quantum=quantum(self.experiment.readings, self.judge.rows),
-            zeros=zeros_of_noise(self.judge, chosen) if verdict == "no_effect" else 0.0,
             baseline=baseline.fit,
             final=final.fit,
             best=nearest.fit if verdict == "unexplained" and nearest.effects else None,
             instead=tuple(instead.values()),
-            effects=() if verdict == "no_effect" else self.models.by_strength(final),
+            effects=self.models.by_strength(final),
             rivals=rivals,
             pairs=[
                 *pairs_of(self.models, final, rivals, of_the_curve),
@@ -198,9 +196,7 @@ class Search:
             )
             verdict = verdict_on(self.judge, levels[0][0], chosen)
             if verdict not in ("effect_found", "effect_discovered"):
-                # Zeros of runs that are noise stay with it.
-                noise = verdict == "no_effect" and bool(chosen.effects)
-                return chosen, verdict, self.models.last(chosen) if noise else levels[0][0], {}
+                return chosen, verdict, levels[0][0], {}
             level = levels[len(chosen.effects)]
             final = self.models.last(chosen)
             self.progress(0.9, "rivals")

@@ -25,6 +25,7 @@ from .judge import Model
 from .one_search import Search
 from .ranking import nearest_forms
 from .rivals import near
+from .zeros import with_zeros_as_noise
 
 __all__ = ["diagnose_test"]
 
@@ -44,6 +45,15 @@ def diagnose_test(
     Raises:
         SolveError: the baseline could not be fitted.
     """
+    if names is not None:
+        return _found(experiment, names, progress)
+    return with_zeros_as_noise(_found(experiment, names, progress))
+
+
+def _found(
+    experiment: Experiment, names: Sequence[str] | None, progress: Callable[[float, str], None]
+) -> Diagnosis:
+    """The diagnosis, zeros of runs among its effects."""
     listed = [e for e in experiment.effects if names is None or e.name in names]
     common = InCommon(experiment)
     search = Search(experiment, listed, progress, common=common)
@@ -143,10 +153,6 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
         # Then the other one is as good, and says what there is.
         least = -CRITERIA.decisive
     gain = final.criterion - other.criterion_after
-    instead = single.chosen
-    if other.zeros and instead is not None and final.criterion - instead.criterion > least:
-        # Zeros that are noise are less of a claim than any effect.
-        return _beside(_or_several(single, further, instead.criterion), found)
     if _at_the_edge(other.final) or any(effect.of_two for effect in other.effects):
         # It may stand for another law as well as they, or is no simpler than two of them.
         least = CRITERIA.decisive

@@ -79,8 +79,8 @@ def _verdict(report: Mapping[str, Any]) -> str:
         errors = f"held-out error {before}{_foreseen(report)}; {scatter}"
         if report["noise_model"]["zeros"]:
             says = (
-                "The baseline model explains the data but for zeros of the runs, which differ as "
-                "readings scatter; no effect has to be added"
+                "The baseline model explains the data but for zeros of the runs, which scatter "
+                "about nothing; no effect has to be added"
             )
             errors = f"held-out error {after}, {before} without zeros; {scatter}"
         return f"{says}: {errors}.{_if_alike(report)}"

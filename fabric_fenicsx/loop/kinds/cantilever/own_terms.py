@@ -110,4 +110,5 @@ def _form(name: str, label: str) -> tuple[Parameter, str, str, dict[str, Any]]:
     def at_its_value(does: Callable[[Any, Values], Any]) -> Callable[[Values, Values], Any]:
         return lambda p, at: does(p[own.name], at)
 
-    return own, y, whose, {whose: True, **{of: at_its_value(does) for of, does in what.items()}}
+    options = {of: at_its_value(does) for of, does in what.items()}
+    return own, y, whose, {whose: True, "zeros": whose == RUN, **options}

@@ -170,6 +170,7 @@ PICTURE_FRAME_EFFECTS = (
                 (OFFSET,),
                 reading=lambda p, t: p["offset_N"],
                 each_run="zero",
+                zeros=True,
             ),
             FrameVariant(
                 "offset and drift of each run",

@@ -1,0 +1,67 @@
+"""Zeros of runs that scatter about nothing: a matter of the readings, and no effect.
+
+A load cell or a camera that is set to nothing before each run is off by a little, to either side:
+that is noise which all readings of a run share. A zero that is off to one side in all of them is
+not, nor is one that drifts.
+"""
+
+from __future__ import annotations
+
+from math import erfc, sqrt
+
+import numpy as np
+from scipy.stats import ttest_1samp
+
+from .criteria import CRITERIA
+from .diagnosis import Diagnosis
+from .effects import Effect, Variant
+
+__all__ = ["scatter_about_nothing", "with_zeros_as_noise"]
+
+
+def scatter_about_nothing(zeros: list[float]) -> bool:
+    """Whether the mean of two or more numbers is not told from nothing, by Student's t.
+
+    At the level that two standard errors have, of a normal distribution.
+    """
+    level = erfc(CRITERIA.significant / sqrt(2.0))
+    return len(zeros) > 1 and float(ttest_1samp(zeros, 0.0).pvalue) > level
+
+
+def with_zeros_as_noise(found: Diagnosis) -> Diagnosis:
+    """A diagnosis in which such zeros are of the noise: they stay in the model, and are no effect.
+
+    Not where an effect with a name is a rival of theirs: friction, of runs to one side each.
+    """
+    zeros = _of_zeros(found)
+    if zeros is None:
+        return found
+    effect, variant = zeros
+    values = [found.final.values[p.name] for p in variant.parameters]
+    listed = {e.name for e in found.experiment.effects}
+    rivals = found.rivals.get(effect.name, [])
+    if listed & set(rivals) or not scatter_about_nothing(values):
+        return found
+    left = tuple(e for e in found.effects if e is not effect)
+    found.zeros = float(np.sqrt(np.mean(np.square(values))))
+    found.effects = left
+    found.rivals = {
+        name: [rival for rival in others if rival != effect.name]
+        for name, others in found.rivals.items()
+        if name != effect.name
+    }
+    found.pairs = [pair for pair in found.pairs if effect.name not in (pair[0], pair[2])]
+    if not left:
+        found.verdict = "no_effect"
+    elif all(e.listed or e.by_definition for e in left):
+        found.verdict = "effect_found"
+    return found
+
+
+def _of_zeros(found: Diagnosis) -> tuple[Effect, Variant] | None:
+    """Of what is claimed, the effect whose form is a zero of each run; None where none is."""
+    for variant in (v for v in found.final.variants if v.zeros):
+        for effect in found.effects:
+            if variant in effect.variants:
+                return effect, variant
+    return None
