@@ -459,6 +459,25 @@ def test_a_term_that_leaves_doubtful_noise_is_not_all(monkeypatch, doubtful):
     assert all(set(test.terms) <= set(effects) for effects in beside)
 
 
+@pytest.mark.parametrize(("slow", "names"), [(False, ["ramp"]), (True, [])])
+def test_a_name_beside_slow_noise_is_none_where_a_term_is_likelier(monkeypatch, slow, names):
+    """Although held-out runs contradict that: what is slow may be what the name misses by."""
+    columns = {"ramp": lambda t: t**2, "kink": lambda t: np.maximum(t - 0.6, 0.0)}
+    test = made(columns, lambda t: 3.0 * columns["kink"](t), [linear_effect("ramp")])
+    test.terms = [linear_effect("kink", acts_on="reading")]
+    test.terms_are_rivals = True
+
+    def explains(judge, model, baseline, **how):
+        return [e.name for e in model.effects] == ["ramp"]
+
+    monkeypatch.setattr(Judge, "accounts", lambda judge, model, baseline: bool(model.effects))
+    monkeypatch.setattr(Judge, "explains", explains)
+    monkeypatch.setattr(Judge, "slow_noise", lambda judge, model: slow)
+    found = diagnose_test(test)
+    assert [e.name for e in found.effects] == names
+    assert found.verdict == ("effect_found" if names else "unexplained")
+
+
 @pytest.mark.parametrize(("much", "found"), [(0.0, {"kink"}), (0.015, {"kink", "hum"})])
 def test_a_term_that_leaves_a_little_more_than_was_stated_is_not_all(much, found):
     """By an eighth: less than a noise may be misstated by, and more than it is by chance."""

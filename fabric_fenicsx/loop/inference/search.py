@@ -180,11 +180,16 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
         doubted = len(chosen.effects) > 1 and search.doubtful_noise
         # Three with names may imitate one of them and a term.
         doubted |= len(chosen.effects) > CRITERIA.most_terms or further.may_be_one_more(final)
-        if doubted or search.judge.slow_noise(final):
+        slow = search.judge.slow_noise(final)
+        if doubted or slow:
             # It may be a misfit: what several terms explain instead is not said to be noise.
             several = _several(further, final.criterion)
             if several is not None and not _alike(several.effects, chosen.effects):
                 return _beside(several, found)
+            if slow and several is None and _beaten(further, final):
+                # Nor where held-out runs contradict them.
+                assert further.found is not None
+                return _beside(further.found, found)
     if len(found.effects) == 1 and doubt.rivals:
         _name_terms(search, final, single)
     return found
@@ -225,6 +230,13 @@ def _several(further: Search, criterion: float) -> Diagnosis | None:
     found = further.run()
     better = found.criterion_after < criterion - CRITERIA.decisive
     return found if further.accounted and better else None
+
+
+def _beaten(further: Search, final: Model) -> bool:
+    """Whether terms account for the fitted readings, and are decidedly likelier than a model."""
+    chosen = further.chosen
+    better = chosen is not None and chosen.criterion < final.criterion - CRITERIA.decisive
+    return bool(further.accounted and better)
 
 
 def _alike(several: Sequence[Effect], named: Sequence[Effect]) -> bool:
