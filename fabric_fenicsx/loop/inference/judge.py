@@ -323,7 +323,8 @@ class Judge:
         what each model says of them: that specimens differ, and how little it is known there; or by
         what is off there by more than twice the noise, and no nearer than what lacks it, whatever
         it expects; or by what is vague there, in that it expects more than twice the error that
-        what lacks it does, and is off as much and more than half as far as that. Nor by a term
+        what lacks it does, or, by specimens that differ unusually, more than that makes, and is off
+        by more than twice the noise and more than half as far as that. Nor by a term
         without a formula, or an effect that is another one in each specimen, that makes them less
         likely, or expects a larger error, at all.
         """
@@ -338,7 +339,9 @@ class Judge:
             # An exponent that few rates tell expects anything at another one, and may be right.
             nearer = known and CRITERIA.significant * error < before
             off = error > CRITERIA.significant * self.misfit(model).noise
-            vague = expected[0] >= times * expected[1] and off and not nearer
+            # Specimens that differ unusually make it expect more than there is to be explained.
+            empty = self.unlike(model.fit) and expected[0] >= before
+            vague = (expected[0] >= times * expected[1] or empty) and off and not nearer
             if vague or (off and error >= before) or mine >= other + more:
                 return False
         fits = self.fits(model, baseline, roughly=roughly)
