@@ -607,3 +607,46 @@ def test_of_models_that_are_as_good_the_simplest_comes_first(criteria, first):
     ]
     in_order = sorted(models, key=lambda m: m.criterion)
     assert simplest_first(in_order)[0] is models[first]
+
+
+@pytest.mark.parametrize(
+    ("error", "expected", "unlike", "explained"),
+    [
+        # In noises; the baseline misses by 4 and expects 5.
+        (1.1, 1.1, False, True),
+        (4.1, 9.0, False, False),
+        (3.9, 9.0, False, True),
+        (3.9, 11.0, False, False),
+        (3.9, 9.0, True, False),
+        (3.9, 3.5, True, True),
+        (1.9, 9.0, True, True),
+    ],
+)
+def test_what_misses_held_out_runs_like_the_baseline(
+    monkeypatch, error, expected, unlike, explained
+):
+    """By no less than it; by less, where more was expected still, or specimens differ unusually."""
+    rng = np.random.default_rng(9)
+    t = np.tile(np.linspace(0.0, 1.0, 60), 4)
+    run = np.repeat(np.arange(4), 60)
+    columns = {"a": np.ones_like(t), "b": t, "ramp": t**2}
+    observed = 100.0 + 2.0 * t + 3.0 * t**2 + SIGMA * rng.normal(size=len(t))
+    effect = linear_effect("ramp")
+    test = Linear(readings(observed, run=run, holdout=(3,)), columns, ("a", "b"), noise=SIGMA)
+    judge, rows = Judge(test, [effect]), test.readings.fit
+    start, noise = {"a": 100.0, "b": 2.0}, Variances(Noise(SIGMA))
+    baseline = judge.weighed(fit(test, (), start, rows, noise), ())
+    model = judge.weighed(
+        fit(test, effect.variants, start | {"ramp": 3.0}, rows, noise), (effect,)
+    )
+    noise_of = judge.misfit(model).noise
+
+    def known(own, other):
+        return lambda judge, of, *rest: noise_of * (own if of in (model, model.fit) else other)
+
+    monkeypatch.setattr(Judge, "holdout", known(error, 4.0))
+    monkeypatch.setattr(Judge, "_expected", known(expected, 5.0))
+    monkeypatch.setattr(Judge, "unlike", lambda judge, of: unlike)
+    monkeypatch.setattr(Judge, "fits", lambda judge, *of, **how: True)
+    monkeypatch.setattr(Judge, "foretells", lambda judge, *of, **how: True)
+    assert judge.explains(model, baseline) is explained
