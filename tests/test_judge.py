@@ -636,9 +636,7 @@ def test_what_misses_held_out_runs_like_the_baseline(
     judge, rows = Judge(test, [effect]), test.readings.fit
     start, noise = {"a": 100.0, "b": 2.0}, Variances(Noise(SIGMA))
     baseline = judge.weighed(fit(test, (), start, rows, noise), ())
-    model = judge.weighed(
-        fit(test, effect.variants, start | {"ramp": 3.0}, rows, noise), (effect,)
-    )
+    model = judge.weighed(fit(test, effect.variants, start | {"ramp": 3.0}, rows, noise), (effect,))
     noise_of = judge.misfit(model).noise
 
     def known(own, other):
