@@ -614,8 +614,9 @@ def test_of_models_that_are_as_good_the_simplest_comes_first(criteria, first):
     [
         # In noises; the baseline misses by 4 and expects 5.
         (1.1, 1.1, False, True),
-        (4.1, 9.0, False, False),
-        (3.9, 9.0, False, True),
+        # A specimen may be nearer to what lacks the effect, by chance.
+        (4.1, 9.0, False, True),
+        (4.1, 9.0, True, False),
         (3.9, 11.0, False, False),
         (3.9, 9.0, True, False),
         (3.9, 3.5, True, True),
@@ -625,7 +626,7 @@ def test_of_models_that_are_as_good_the_simplest_comes_first(criteria, first):
 def test_what_misses_held_out_runs_like_the_baseline(
     monkeypatch, error, expected, unlike, explained
 ):
-    """By no less than it; by less, where more was expected still, or specimens differ unusually."""
+    """Where more was expected still, or more than it misses by, as specimens differ unusually."""
     rng = np.random.default_rng(9)
     t = np.tile(np.linspace(0.0, 1.0, 60), 4)
     run = np.repeat(np.arange(4), 60)

@@ -321,12 +321,11 @@ class Judge:
 
         Nothing is explained by what makes holdout runs decidedly less likely than what lacks it, by
         what each model says of them: that specimens differ, and how little it is known there; or by
-        what is off there by more than twice the noise, and no nearer than what lacks it, whatever
-        it expects; or by what is vague there, in that it expects more than twice the error that
-        what lacks it does, or, by specimens that differ unusually, more than that makes, and is off
-        by more than twice the noise and more than half as far as that. Nor by a term
-        without a formula, or an effect that is another one in each specimen, that makes them less
-        likely, or expects a larger error, at all.
+        what is vague there, in that it expects more than twice the error that what lacks it does,
+        or, by specimens that differ unusually, more than that makes, and is off by more than twice
+        the noise and more than half as far as that. Nor by a term without a formula, or an effect
+        that is another one in each specimen, that makes them less likely, or expects a larger
+        error, at all.
         """
         out = self.foretold_rows(model)
         if out.any() and model is not baseline:
@@ -342,7 +341,7 @@ class Judge:
             # Specimens that differ unusually make it expect more than there is to be explained.
             empty = self.unlike(model.fit) and expected[0] >= before
             vague = (expected[0] >= times * expected[1] or empty) and off and not nearer
-            if vague or (off and error >= before) or mine >= other + more:
+            if vague or mine >= other + more:
                 return False
         fits = self.fits(model, baseline, roughly=roughly)
         return fits and self.foretells(model, roughly=roughly)
