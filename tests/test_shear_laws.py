@@ -158,7 +158,7 @@ def test_maxwell(steps):
 @pytest.mark.parametrize("flow", [0.004, 0.05, 50.0])
 @pytest.mark.parametrize("cubic", [0.0, 2.0])
 def test_maxwell_whose_dashpot_gives_way(flow, cubic):
-    """Against dα/dt = df/dt − (α₀/τ) sinh(α/α₀) by Runge and Kutta: there, a hold, back, another.
+    """Against dα/dt = df/dt − (α₀/τ) sinh(α/α₀) by LSODA: there, a hold, back, another.
 
     Each is one step of a constant rate, which f has where the angle does as well for c = 0 alone:
     the angles here are those at which f goes evenly.

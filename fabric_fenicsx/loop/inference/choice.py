@@ -11,7 +11,7 @@ from .fitted import Fit
 from .judge import Judge, Model
 from .significance import significant
 
-__all__ = ["chosen_model", "in_place_of", "models_instead", "verdict_on"]
+__all__ = ["chosen_model", "have_names", "in_place_of", "models_instead", "verdict_on"]
 
 
 def chosen_model(
@@ -74,12 +74,17 @@ def verdict_on(judge: Judge, baseline: Model, chosen: Model) -> Verdict:
     if judge.experiment.curves_only:
         # Every effect can be such curves: none is told from the others.
         return "unexplained"
-    names = [e.name if e.listed else e.by_definition for e in chosen.effects]
-    if all(names) and len(set(names)) == len(names) and judge.explains(chosen, baseline):
+    if have_names(chosen.effects) and judge.explains(chosen, baseline):
         return "effect_found"
     if all(e.listed for e in chosen.effects) or not judge.explains(chosen, baseline, roughly=True):
         return "unexplained"
     return "effect_discovered"
+
+
+def have_names(effects: Sequence[Effect]) -> bool:
+    """Whether each of some effects has a name of its own, in the list or by definition."""
+    names = [e.name if e.listed else e.by_definition for e in effects]
+    return all(names) and len(set(names)) == len(names)
 
 
 def models_instead(

@@ -12,6 +12,7 @@ from math import erfc, sqrt
 import numpy as np
 from scipy.stats import ttest_1samp
 
+from .choice import have_names
 from .criteria import CRITERIA
 from .diagnosis import Diagnosis
 from .effects import Effect, Variant
@@ -53,7 +54,7 @@ def with_zeros_as_noise(found: Diagnosis) -> Diagnosis:
     found.pairs = [pair for pair in found.pairs if effect.name not in (pair[0], pair[2])]
     if not left:
         found.verdict = "no_effect"
-    elif all(e.listed or e.by_definition for e in left):
+    elif have_names(left):
         found.verdict = "effect_found"
     return found
 

@@ -148,7 +148,7 @@ class Maxwell(CrossingLaw):
         tau = at.number(self.relaxation_time)
         rate = at.change + at.number(self.cubic) * (at.gamma**3 - at.gamma_n**3)
         rate *= at.per_time
-        if isinstance(self.flow, float) and self.flow == 0.0:
+        if isinstance(self.flow, int | float) and self.flow == 0.0:
             decay = exp(-1 / (tau * at.per_time))
             return at.past("angle") * decay + rate * tau * (1 - decay)
         return self._given_way(at, rate, 1 / tau)
