@@ -190,6 +190,36 @@ def test_parts_that_cannot_be_predicted_are_counted():
     assert (none.parts, none.failed) == (2, 2) and np.isnan(none.error(rows))
 
 
+class Decaying(Linear):
+    """exp(-a t) at 2.5 < t < 3.5, where little is left, and at t < 0.5; one sigma is 0.02."""
+
+    def __init__(self, first, second):
+        t = np.concatenate([np.linspace(2.5, 3.5, 40), np.linspace(0.05, 0.5, 30)])
+        a = np.where(t > 1.0, first, second)
+        observed = np.exp(-a * t) + 0.02 * np.random.default_rng(4).normal(size=70)
+        data = readings(observed, run=(t < 1.0).astype(np.int64))
+        super().__init__(replace(data, specimen=np.zeros_like(data.run)), {"a": t}, ("a",))
+
+    def predict(self, variants, values, deviations=NO_DEVIATIONS):
+        y = np.exp(-values["a"] * self.columns["a"])
+        return y, {"a": -self.columns["a"] * y}
+
+
+@pytest.mark.parametrize(("first", "second", "agree"), [(3.0, 3.0, True), (0.5, 3.0, False)])
+def test_a_run_that_others_hardly_know_of_is_judged_beside_them(first, second, agree):
+    """What is left of 1 hardly tells how fast the rest decayed, which to first order it does."""
+    test = Decaying(first, second)
+    rows = test.readings.fit
+    model = fit(test, (), {"a": 3.0}, rows, Variances(Noise(0.02)))
+    parts = parts_by(test.readings.run, rows)
+    to_first_order = cross_validated(test, model, parts, open_ended=True)
+    found = cross_validated(test, model, parts)
+    np.testing.assert_array_equal(found.off, to_first_order.off)
+    assert to_first_order.predictive > 2.0
+    assert (found.predictive < 1.15) is agree
+    assert found.uncertain == to_first_order.uncertain > 0.0
+
+
 def diagnosed(seed, name, specimen=""):
     """A set of the independent generator, diagnosed, and what was put in.
 
@@ -243,7 +273,8 @@ def test_two_rates_do_not_tell_a_power_from_friction():
     """Either fits two rates of one specimen, and the other one is named beside it.
 
     Which of them comes first is a matter of rounding. Where the held-out rate contradicts that, it
-    is not claimed, and the other one is not taken for the held-out run's sake.
+    is not claimed, and the other one is not taken for the held-out run's sake. A branch whose
+    dashpot gives way is an Eyring dashpot behind a spring, and may come as near.
     """
     _, found = diagnosed(10, "rate_hardening-thinning_alone", "A")
     gains = {c.effect.name: c.criterion for c in found.candidates}
@@ -264,7 +295,7 @@ def test_two_rates_do_not_tell_a_power_from_friction():
             if set(e.variants) & set(f.variants)
         ]
         (own,) = own
-    assert {own, *others} == {"rate_hardening", "crossover_friction"}
+    assert {own, *others} - {"crossover_relaxation"} == {"rate_hardening", "crossover_friction"}
 
 
 @pytest.mark.slow

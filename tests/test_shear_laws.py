@@ -110,6 +110,12 @@ def test_power_dashpot(power):
     assert M == pytest.approx([5.0 * 0.1**power, -5.0 * 0.3**power], rel=1e-7)
 
 
+def test_power_dashpot_grows_with_the_angle():
+    """C (1 + a |γ|) |γ̇|^p sign γ̇, whichever side it is on."""
+    M = moments(PowerDashpot(5.0, 0.5, growth=2.0), [0.1, -0.2])
+    assert M == pytest.approx([5.0 * 1.2 * 0.1**0.5, -5.0 * 1.4 * 0.3**0.5], rel=1e-7)
+
+
 def test_eyring_dashpot():
     """C asinh(γ̇/v), odd, at rates of 1e-6 to 1e4 times v."""
     rates = np.array([1e-6, 0.01, 1.0, 100.0, 1e4])

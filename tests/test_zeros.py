@@ -6,7 +6,12 @@ import pytest
 
 from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
-from fabric_fenicsx.loop.inference.zeros import scatter_about_nothing, with_zeros_as_noise
+from fabric_fenicsx.loop.inference.zeros import (
+    scatter_about_nothing,
+    with_zeros_as_noise,
+    with_zeros_of_terms,
+    zeros_of_noise,
+)
 
 ZEROS = tuple(Parameter(f"run{k}_zero", amplitude=True) for k in (1, 2, 3))
 
@@ -83,3 +88,27 @@ def test_a_claim_stays_one(values, rivals):
     claimed = [effect("offset", zeros=True)]
     same = with_zeros_as_noise(found(claimed, values, {"offset": rivals}))
     assert (same.verdict, same.effects, same.zeros) == ("effect_found", tuple(claimed), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "of_noise"), [((0.3, -0.4, 0.0), True), ((0.3, 0.4, 0.35), False)]
+)
+def test_zeros_of_noise_are_those_of_an_effect_of_the_model(values, of_noise):
+    zeros = effect("offset", zeros=True)
+    model = found([effect("friction"), zeros], values).final
+    known = zeros_of_noise([zeros], model)
+    assert known == ((zeros, zeros.variants[0]) if of_noise else None)
+    assert zeros_of_noise([effect("friction")], model) is None
+
+
+def test_zeros_of_a_term_are_looked_for_where_no_name_has_them():
+    """With its other forms it is one term of many."""
+    name, load_cell = effect("friction"), effect("offset", zeros=True)
+    (other,) = effect("shape", listed=False).variants
+    term = effect("run", zeros=True, listed=False)
+    both = Effect(term.name, term.test, term.meaning, (*term.variants, other), acts_on="reading")
+    few = with_zeros_of_terms([name], [effect("shape", listed=False), both])
+    assert [e.name for e in few] == ["friction", "run"]
+    assert few[1].variants == term.variants
+    assert not any(e.one_of_many for e in few) and both.one_of_many
+    assert with_zeros_of_terms([name, load_cell], [both]) == [name, load_cell]

@@ -133,7 +133,7 @@ class Diagnosis:
         rivals: by effect, others that this data cannot tell from it.
         candidates: every effect tried.
         holdout_before, holdout_after, holdout_best: held-out errors of the three models.
-        holdout_expected: what the final model itself expects of its own; NaN without holdout runs.
+        holdout_expected: what the final model itself expects of its own; NaN where it says nothing.
         holdout_source: how they were come by.
         criterion_before, criterion_after: of the baseline and the final model; see judge.
         white_before, white_after: tests of the residuals.

@@ -139,6 +139,14 @@ class Effect:
         """Whether it is an effect with a name rather than a term without a formula."""
         return not self.acts_on
 
+    @property
+    def one_of_many(self) -> bool:
+        """Whether it is a term that is looked for among many: not one that has zeros of runs alone.
+
+        These may be beside anything, as they are of the readings; see inference.zeros.
+        """
+        return not self.listed and not all(variant.zeros for variant in self.variants)
+
     def form_in(self, forms: Iterable[Variant]) -> Variant:
         """Its form among those of a model that it is in."""
         return next(form for form in forms if form in self.variants)

@@ -103,7 +103,7 @@ class Judge:
         self._effects = effects
         self.outliers: Flags = np.zeros(len(self._readings.observed), dtype=bool)
         self.given = experiment.noise
-        self.compared = any(not effect.listed for effect in effects)
+        self.compared = any(effect.one_of_many for effect in effects)
         several = len(np.unique(self._readings.folder[self._readings.fit])) > 1
         self._usual = CRITERIA.laboratories if several else CRITERIA.usual_scatter
         self._misfits: dict[Fit, Misfit] = {}
@@ -448,8 +448,10 @@ class Judge:
         return model.rms(out & own) if out.any() else self.left_out(model).error(own)
 
     def expected_holdout(self, model: Fit, noise: float) -> float:
-        """What the model itself expects the held-out error of holdout runs to be; NaN without."""
-        return self._expected(model, self.held_rows, noise)
+        """What the model itself expects the held-out error to be, as its parameters are known."""
+        if self.held_rows.any():
+            return self._expected(model, self.held_rows, noise)
+        return float(np.hypot(noise, self.left_out(model).uncertain))
 
     def _expected(self, model: Fit, out: Flags, noise: float, known: Sequence[str] = ()) -> float:
         """The same of some readings, as if some common parameters were known to be as found."""

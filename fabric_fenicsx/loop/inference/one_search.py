@@ -72,7 +72,7 @@ class Search:
         #: Terms over two variables, which are for where no single effect or other term will do.
         self._of_two = [e for e in effects if e.of_two]
         # With what has no formula there are too many to fit them all.
-        self._screened_first = any(not effect.listed for effect in effects)
+        self._screened_first = any(effect.one_of_many for effect in effects)
         self.models = Models(experiment, effects, common)
         self.judge = self.models.judge
         #: Whether the chosen model leaves noise in the fitted readings; holdout runs have no say.
@@ -278,12 +278,28 @@ class Search:
                 break
             # What leaves noise leaves no term far less of it.
             quiet = self.judge.settled(best, levels[0][0])
-            self.gave_way = not quiet and self.gives_way(best)
+            asked = not quiet and not self._lacks_only_zeros(best, levels[0][0])
+            self.gave_way = asked and self.gives_way(best)
             if self.gave_way:
                 break
             self.progress(0.5 + 0.15 * (count - 2), f"fit {count} effects together")
             self.several.look_for_one_more(levels, count, best)
         return candidates, [level for level in levels if level]
+
+    def _lacks_only_zeros(self, model: Model, baseline: Model) -> bool:
+        """Whether a model of one effect leaves noise once each run has a zero of its own.
+
+        Zeros are of the readings (see zeros): with them it is no more than a single effect.
+        """
+        with_zeros = [e for e in self.effects if any(v.zeros for v in e.variants)]
+        if len(model.effects) != 1 or not with_zeros or model.effects[0] in with_zeros:
+            return False
+        found: list[Fit] = []
+        for base in self.models.with_solutions([model]):
+            every = self.models.beside(base, with_zeros)
+            own = [one for one in every if all(variant.zeros for variant, _ in one)]
+            found += self.models.fitted(own, starts=1, base=base)
+        return any(self.judge.settled(one, baseline) for one in self.models.ranked(found))
 
     def _alone(self) -> tuple[list[Candidate], list[list[Model]]]:
         """Candidates by themselves, and models of no effect and of one."""

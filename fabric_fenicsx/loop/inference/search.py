@@ -25,7 +25,7 @@ from .judge import Model
 from .one_search import Search
 from .ranking import nearest_forms
 from .rivals import near
-from .zeros import with_zeros_as_noise
+from .zeros import with_zeros_as_noise, with_zeros_of_terms, zeros_of_noise
 
 __all__ = ["diagnose_test"]
 
@@ -56,9 +56,10 @@ def _found(
     """The diagnosis, zeros of runs among its effects."""
     listed = [e for e in experiment.effects if names is None or e.name in names]
     common = InCommon(experiment)
-    search = Search(experiment, listed, progress, common=common)
     if names is not None or not experiment.terms:
-        return search.run()
+        return Search(experiment, listed, progress, common=common).run()
+    few = with_zeros_of_terms(listed, experiment.terms)
+    search = Search(experiment, few, progress, common=common)
     every = [*listed, *experiment.terms]
     further = Search(experiment, every, progress, most=1, common=common)
     # One term is less than several effects, and sooner found.
@@ -102,7 +103,8 @@ def _doubt(search: Search, further: Search) -> _Doubt | None:
     """
     chosen, experiment = search.chosen, search.experiment
     assert chosen is not None
-    own = [effect.name for effect in chosen.effects]
+    zeros = zeros_of_noise(chosen.effects, chosen.fit)
+    own = [effect.name for effect in chosen.effects if zeros is None or effect is not zeros[0]]
     alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
     in_its_way = experiment.each_its_own_way and search.specimens_differ
     doubtful = in_its_way or search.judge.uneven(chosen.fit)

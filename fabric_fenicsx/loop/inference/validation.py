@@ -36,6 +36,8 @@ class CrossValidation:
         off: what the predictions miss of each reading, times its weight, (n,); NaN of those that
             were in no part, or in one that could not be predicted.
         predictive: the same over sigma, less what predictions allow for; see Fit.predictive_rms.
+        uncertain: standard error of the predictions of the first quantity, root mean square, as
+            their parameters are known and specimens differ; NaN where there are none.
         parts: that were left out in turn.
         failed: those of them that could not be predicted: too few readings are left, or the model
             has no solution there.
@@ -43,6 +45,7 @@ class CrossValidation:
 
     off: npt.NDArray[np.float64]
     predictive: float
+    uncertain: float
     parts: int
     failed: int
 
@@ -86,7 +89,8 @@ def cross_validated(
         open_ended: see Fit.predictive_rms.
     """
     off = np.full(len(model.used), np.nan)
-    allowed, count, failed = 0.0, 0, 0
+    allowed, uncertain, count, failed = 0.0, 0.0, 0, 0
+    first, counted = experiment.readings.first, 0
     for part in parts:
         again = fitted_without(experiment, model, part)
         if again is None:
@@ -94,13 +98,50 @@ def cross_validated(
             continue
         size = int(part.sum())
         off[part] = (again.residual * again.readings.weight)[part]
-        allowed += size * again.predictive_rms(part, open_ended=open_ended) ** 2
+        left = size * again.predictive_rms(part, open_ended=open_ended) ** 2
+        if not open_ended:
+            left = min(left, _beside_the_others(experiment, model, again, part, left))
+        allowed += left
         count += size
-    predictive = float(np.sqrt(allowed / count)) if count else float("nan")
-    return CrossValidation(off, predictive, len(parts), failed)
+        own = part & first
+        if own.any():
+            uncertain += int(own.sum()) * again.prediction_std(own) ** 2
+            counted += int(own.sum())
+    return CrossValidation(
+        off, _root_mean(allowed, count), _root_mean(uncertain, counted), len(parts), failed
+    )
 
 
-def fitted_without(experiment: Experiment, model: Fit, part: Flags) -> Fit | None:
+def _root_mean(total: float, count: int) -> float:
+    return float(np.sqrt(total / count)) if count else float("nan")
+
+
+def _beside_the_others(
+    experiment: Experiment, model: Fit, others: Fit, part: Flags, left: float
+) -> float:
+    """Sum of squares that a part adds to what the others leave.
+
+    To first order that is what it leaves less what their prediction allows for. Of a model far from
+    linear they may allow for what they do not expect: a gap that they hardly touch is as wide as it
+    is found with this part, although they alone would have it narrow.
+
+    Args:
+        experiment: the test.
+        model: fitted to all.
+        others: the same without the part, perhaps not to the end.
+        part: of the readings.
+        left: that sum of squares to first order.
+    """
+    if model.sum_of_squares - others.sum_of_squares < left and not others.converged:
+        # What they leave in the end is less.
+        others = fitted_without(experiment, others, part, CRITERIA.evaluations) or others
+    more = model.sum_of_squares - others.sum_of_squares
+    return max(more, 0.0) if others.converged else left
+
+
+def fitted_without(
+    experiment: Experiment, model: Fit, part: Flags, evaluations: int = 25
+) -> Fit | None:
     """A model fitted to the rest of its readings.
 
     None where too few readings are left or the model has no solution.
@@ -116,7 +157,7 @@ def fitted_without(experiment: Experiment, model: Fit, part: Flags) -> Fit | Non
             rest,
             model.variances,
             deviations=model.deviations,
-            evaluations=25,
+            evaluations=evaluations,
         )
     except SolveError:
         return None

@@ -7,6 +7,8 @@ not, nor is one that drifts.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from math import erfc, sqrt
 
 import numpy as np
@@ -16,8 +18,9 @@ from .choice import have_names
 from .criteria import CRITERIA
 from .diagnosis import Diagnosis
 from .effects import Effect, Variant
+from .fitted import Fit
 
-__all__ = ["scatter_about_nothing", "with_zeros_as_noise"]
+__all__ = ["scatter_about_nothing", "with_zeros_as_noise", "with_zeros_of_terms", "zeros_of_noise"]
 
 
 def scatter_about_nothing(zeros: list[float]) -> bool:
@@ -29,19 +32,42 @@ def scatter_about_nothing(zeros: list[float]) -> bool:
     return len(zeros) > 1 and float(ttest_1samp(zeros, 0.0).pvalue) > level
 
 
+def with_zeros_of_terms(listed: Sequence[Effect], terms: Sequence[Effect]) -> list[Effect]:
+    """Effects with a name, and zeros of runs where only terms without a formula have them."""
+
+    def zeros(effect: Effect) -> tuple[Variant, ...]:
+        return tuple(variant for variant in effect.variants if variant.zeros)
+
+    if any(map(zeros, listed)):
+        return [*listed]
+    return [*listed, *(replace(term, variants=zeros(term)) for term in terms if zeros(term))]
+
+
+def zeros_of_noise(effects: Sequence[Effect], model: Fit) -> tuple[Effect, Variant] | None:
+    """Of some effects of a model the one whose form is a zero of each run, and that form.
+
+    None where there is none, or its zeros do not scatter about nothing.
+    """
+    for variant in (v for v in model.variants if v.zeros):
+        values = [model.values[p.name] for p in variant.parameters]
+        for effect in effects:
+            if variant in effect.variants and scatter_about_nothing(values):
+                return effect, variant
+    return None
+
+
 def with_zeros_as_noise(found: Diagnosis) -> Diagnosis:
     """A diagnosis in which such zeros are of the noise: they stay in the model, and are no effect.
 
     Not where an effect with a name is a rival of theirs: friction, of runs to one side each.
     """
-    zeros = _of_zeros(found)
+    zeros = zeros_of_noise(found.effects, found.final)
     if zeros is None:
         return found
     effect, variant = zeros
     values = [found.final.values[p.name] for p in variant.parameters]
     listed = {e.name for e in found.experiment.effects}
-    rivals = found.rivals.get(effect.name, [])
-    if listed & set(rivals) or not scatter_about_nothing(values):
+    if listed & set(found.rivals.get(effect.name, [])):
         return found
     left = tuple(e for e in found.effects if e is not effect)
     found.zeros = float(np.sqrt(np.mean(np.square(values))))
@@ -57,12 +83,3 @@ def with_zeros_as_noise(found: Diagnosis) -> Diagnosis:
     elif have_names(left):
         found.verdict = "effect_found"
     return found
-
-
-def _of_zeros(found: Diagnosis) -> tuple[Effect, Variant] | None:
-    """Of what is claimed, the effect whose form is a zero of each run; None where none is."""
-    for variant in (v for v in found.final.variants if v.zeros):
-        for effect in found.effects:
-            if variant in effect.variants:
-                return effect, variant
-    return None

@@ -7,6 +7,7 @@ from typing import Any
 
 from ...inputs.groups import NotNegative
 from ...inputs.parameters import Parameter
+from .coulomb import GROWTH
 from .law import Crossing, CrossingLaw, Form, Times, asinh, number, per_area
 
 __all__ = ["EyringDashpot", "LinearDashpot", "PowerDashpot"]
@@ -15,6 +16,7 @@ __all__ = ["EyringDashpot", "LinearDashpot", "PowerDashpot"]
 # Negative, it would feed the fabric with energy at some rate.
 C_N = Parameter("c_n_N_s_n", lower=0.0, amplitude=True, meaning="moment per rate^n")
 N = Parameter("n", (0.3, 0.6, 1.5, 2.0), 0.1, 4.0, meaning="power of the rate")
+IN_POWER = {"c": C_N, "power": N, "floor": 1e-7}
 C = Parameter("c_N", lower=0.0, amplitude=True, meaning="moment per e of the rate")
 ABOUT = "rate about which the moment bends over"
 RATE = Parameter("rate_rad_s", (1e-3, 0.03, 0.3), 1e-4, 3.0, meaning=ABOUT, share_of="rate")
@@ -47,21 +49,29 @@ class LinearDashpot(CrossingLaw):
 
 @dataclass(frozen=True)
 class PowerDashpot(CrossingLaw):
-    """M = c |γ̇|^p sign γ̇, rounded below a rate v: c γ̇ (γ̇² + v²)^((p−1)/2).
+    """M = c (1 + a |γ|) |γ̇|^p sign γ̇, rounded below a rate v: c (1 + a |γ|) γ̇ (γ̇² + v²)^((p−1)/2).
 
     Attributes:
         c: [N mm s^p].
         power: p [-]; 1 is the linear dashpot, smaller ones flatten towards friction.
         floor: v [rad/s], well below those of interest, where the slope stays finite.
+        growth: a [1/rad], as shear presses the tows together.
     """
 
     c: Any = per_area("c_N_mm", "moment per area at a rate of 1 rad/s")
     power: Any = number("power", "exponent of the rate; 1 is a linear dashpot")
     floor: Any = number("floor_rad_s", "v, rate below which it is linear", default=1e-5)
+    growth: Any = number("growth_1_rad", "a, growth with the angle", NotNegative, 0.0)
 
     law = "power_dashpot"
     forms = (
-        Form("rate_hardening", "power law", ({"c": C_N, "power": N, "floor": 1e-7},)),
+        Form("rate_hardening", "power law", (IN_POWER,)),
+        Form(
+            "rate_hardening",
+            "power law, growing with the angle",
+            ({**IN_POWER, "growth": replace(GROWTH, meaning="of c_n, with the angle")},),
+            rank=3,
+        ),
         # Beside the baseline's linear dashpot, which may be less for it: near any that thickens.
         Form("rate_hardening", "powers 1.5 and 3", (_thickening(1, 1.5), _thickening(2, 3.0))),
     )
@@ -69,7 +79,8 @@ class PowerDashpot(CrossingLaw):
     def moment(self, at: Crossing) -> Any:
         """The rounded power of the rate."""
         rounded = at.rate**2 + at.number(self.floor) ** 2
-        return at.number(self.c) * at.rate * rounded ** ((at.number(self.power) - 1) / 2)
+        c = at.number(self.c) * (1 + at.number(self.growth) * at.size)
+        return c * at.rate * rounded ** ((at.number(self.power) - 1) / 2)
 
 
 @dataclass(frozen=True)
