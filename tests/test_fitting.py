@@ -212,12 +212,9 @@ def test_a_run_that_others_hardly_know_of_is_judged_beside_them(first, second, a
     rows = test.readings.fit
     model = fit(test, (), {"a": 3.0}, rows, Variances(Noise(0.02)))
     parts = parts_by(test.readings.run, rows)
-    to_first_order = cross_validated(test, model, parts, open_ended=True)
     found = cross_validated(test, model, parts)
-    np.testing.assert_array_equal(found.off, to_first_order.off)
-    assert to_first_order.predictive > 2.0
-    assert (found.predictive < 1.15) is agree
-    assert found.uncertain == to_first_order.uncertain > 0.0
+    assert found.predictive > 2.0 and found.uncertain > 0.0
+    assert (found.beside < 1.15) is agree
 
 
 def diagnosed(seed, name, specimen=""):

@@ -644,7 +644,7 @@ def test_what_misses_held_out_runs_like_the_baseline(
         return lambda judge, of, *rest: noise_of * (own if of in (model, model.fit) else other)
 
     monkeypatch.setattr(Judge, "holdout", known(error, 4.0))
-    monkeypatch.setattr(Judge, "_expected", known(expected, 5.0))
+    monkeypatch.setattr(Judge, "expected", known(expected, 5.0))
     monkeypatch.setattr(Judge, "unlike", lambda judge, of: unlike)
     monkeypatch.setattr(Judge, "fits", lambda judge, *of, **how: True)
     monkeypatch.setattr(Judge, "foretells", lambda judge, *of, **how: True)

@@ -148,8 +148,8 @@ def test_a_fit_that_loses_at_its_end_is_compared_again(monkeypatch):
         lambda m: replace(last(m), criterion=m.criterion + 1e4 * (m.effects == (kink,))),
     )
     monkeypatch.setattr(one_search, "verdict_on", lambda *models: "effect_found")
-    chosen, _, final, _ = own._chosen_of(levels)
-    assert chosen.effects == final.effects == (wave,)
+    choice = own._chosen_of(levels)
+    assert choice.chosen.effects == choice.final.effects == (wave,)
 
 
 def test_what_wins_as_a_rival_is_chosen(monkeypatch):
@@ -162,8 +162,8 @@ def test_what_wins_as_a_rival_is_chosen(monkeypatch):
     tried = iter([{wave: {kink: [best]}}, {}])
     monkeypatch.setattr(one_search, "in_place", lambda *models: next(tried))
     monkeypatch.setattr(one_search, "verdict_on", lambda *models: "effect_found")
-    chosen, _, final, _ = own._chosen_of(levels)
-    assert chosen.effects == final.effects == (kink,)
+    choice = own._chosen_of(levels)
+    assert choice.chosen.effects == choice.final.effects == (kink,)
     assert best in levels[1]
 
 
@@ -195,8 +195,8 @@ def test_beside_what_wins_as_a_rival_others_are_tried(monkeypatch):
     tried = iter([{wave: {kink: [rival]}}, {}, {}])
     monkeypatch.setattr(one_search, "in_place", lambda *models: next(tried))
     monkeypatch.setattr(one_search, "verdict_on", lambda *models: "effect_discovered")
-    chosen, _, final, _ = own._chosen_of(levels)
-    assert set(chosen.effects) == set(final.effects) == {kink, bump}
+    choice = own._chosen_of(levels)
+    assert set(choice.chosen.effects) == set(choice.final.effects) == {kink, bump}
 
 
 @pytest.mark.parametrize(("acts_on", "last"), [("", "rival"), ("reading", "other 3")])

@@ -8,7 +8,8 @@ from .criteria import CRITERIA
 from .diagnosis import Verdict
 from .effects import Effect
 from .fitted import Fit
-from .judge import Judge, Model
+from .judge import Judge
+from .model import Model
 from .significance import significant
 
 __all__ = ["chosen_model", "have_names", "in_place_of", "models_instead", "verdict_on"]

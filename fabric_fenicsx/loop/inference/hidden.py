@@ -12,7 +12,7 @@ from .criteria import CRITERIA
 from .effects import Effect
 from .first_order import Combination, ToFirstOrder
 from .fitted import Fit
-from .judge import Model
+from .model import Model
 from .models import Models
 from .screen import Screen
 from .variances import Variances

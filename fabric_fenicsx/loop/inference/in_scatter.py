@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from .criteria import CRITERIA
 from .effects import Effect
 from .fitted import Fit
-from .judge import Judge, Model
+from .judge import Judge
+from .model import Model
 from .significance import significant
 
 __all__ = ["InScatter", "in_scatter"]

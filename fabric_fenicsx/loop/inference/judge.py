@@ -11,12 +11,10 @@ was not; noise is what is printed. Holdout runs are looked at for that alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 from math import comb, log
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 from scipy.stats import f as f_ratio
 
@@ -25,10 +23,11 @@ from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitted import Fit
 from .fitting import groups_of, linearised
+from .held_out import Flags, HeldOut
 from .likelihood import Linearised
+from .model import Misfit, Model
 from .noise import Noise, Whiteness, missed_readings, outliers, steps_back, whiteness
 from .smoothing import Smoothed, smoothed
-from .validation import CrossValidation, cross_validated, parts_by, stretches
 from .variances import (
     Estimate,
     Variances,
@@ -37,53 +36,10 @@ from .variances import (
     estimate,
 )
 
-__all__ = ["Judge", "Misfit", "Model"]
-
-Flags = npt.NDArray[np.bool_]
+__all__ = ["Judge"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Model:
-    """A fitted model with its variance components; two are the same only if they are one object.
-
-    Attributes:
-        fit: the parameters.
-        effects: in it, in the order of the fit's variants.
-        estimate: of the variance components.
-        criterion: see the module's docstring; smaller is better.
-    """
-
-    fit: Fit
-    effects: tuple[Effect, ...]
-    estimate: Estimate
-    criterion: float
-
-    @property
-    def over_two(self) -> bool:
-        """Whether it has one effect, over two variables, which is no simpler than one over each."""
-        return len(self.effects) == 1 and self.effects[0].of_two
-
-
-@dataclass(frozen=True, slots=True)
-class Misfit:
-    """What a model leaves beside noise.
-
-    Attributes:
-        reading: root mean square of sigma over the fitted readings, with a smooth line through
-            each run allowed for: what is left of readings next to each other.
-        noise: that and the model's own error, where it is known to have one: what is printed.
-        whiteness: tests of what the model leaves.
-        smoothed: how the readings seem to have been smoothed; None where nothing looks like
-            structure, or it is not that.
-    """
-
-    reading: float
-    noise: float
-    whiteness: Whiteness
-    smoothed: Smoothed | None
-
-
-class Judge:
+class Judge(HeldOut):
     """Judges models by the readings of a test.
 
     Args:
@@ -91,33 +47,19 @@ class Judge:
         effects: that may be found.
 
     Attributes:
-        experiment: the test.
-        outliers: readings that are left out, (n,).
         given: one sigma of a reading as it was stated; None where it was not.
         compared: whether criteria are of the largest likelihood; see estimate. Terms without a
             formula, which come in many coefficients, are only alike by that.
     """
 
     def __init__(self, experiment: Experiment, effects: list[Effect]) -> None:
-        self.experiment, self._readings = experiment, experiment.readings
+        super().__init__(experiment)
         self._effects = effects
-        self.outliers: Flags = np.zeros(len(self._readings.observed), dtype=bool)
         self.given = experiment.noise
         self.compared = any(effect.one_of_many for effect in effects)
         several = len(np.unique(self._readings.folder[self._readings.fit])) > 1
         self._usual = CRITERIA.laboratories if several else CRITERIA.usual_scatter
         self._misfits: dict[Fit, Misfit] = {}
-        self._validated: dict[tuple[Fit, bool], CrossValidation] = {}
-
-    @property
-    def rows(self) -> Flags:
-        """Readings that are fitted."""
-        return self._readings.fit & ~self.outliers
-
-    @property
-    def held_rows(self) -> Flags:
-        """Readings of holdout runs that an error is reported for."""
-        return self._readings.holdout & self._readings.usable & ~self.outliers
 
     def foretold_rows(self, model: Model) -> Flags:
         """Readings of holdout runs that say whether a model is right.
@@ -331,7 +273,7 @@ class Judge:
         if out.any() and model is not baseline:
             both = [model.fit, baseline.fit]
             mine, other = (m.predictive_likelihood(out) for m in both)
-            expected = [self._expected(m, out, m.rms(m.used)) for m in both]
+            expected = [self.expected(m, out, m.rms(m.used)) for m in both]
             error, before = (self.holdout(m, out & self._readings.first) for m in both)
             known = all(effect.listed for effect in model.effects) and not self.uneven(model.fit)
             times, more = (CRITERIA.significant, CRITERIA.decisive) if known else (1.0, 0.0)
@@ -386,7 +328,7 @@ class Judge:
             count = int(out.sum())
             # One specimen's deviation is a single number, however many readings share it.
             known = self._known_of(model)
-            expected = self._expected(model.fit, out, self.misfit(model).noise, known)
+            expected = self.expected(model.fit, out, self.misfit(model).noise, known)
             if (
                 self.holdout(model.fit, out & self._readings.first)
                 > CRITERIA.significant * expected
@@ -394,7 +336,9 @@ class Judge:
             ):
                 return False
         else:
-            error = self.left_out(model.fit).predictive
+            found = self.left_out(model.fit)
+            # A term that nobody has fitted there may be anything, which is no prediction.
+            error = found.predictive if _terms_of(model) else found.beside
             count = int(model.fit.used.sum())
         noise = model.fit.variances.noise.typical(self._readings, model.fit.used)
         allowed = CRITERIA.roughly if roughly else CRITERIA.scatter
@@ -436,59 +380,6 @@ class Judge:
         # Half a standard error of the error itself.
         slack = 1.0 + 0.5 / np.sqrt(max(int(model.fit.used.sum()), 1))
         return bool(mine * own[0] < slack * other * own[1])
-
-    def holdout(self, model: Fit, rows: Flags | None = None) -> float:
-        """Held-out error: of the holdout runs, or of each part predicted from the others.
-
-        Args:
-            model: the fit.
-            rows: of which quantity, flags; by default the first.
-        """
-        out, own = self.held_rows, self._readings.first if rows is None else rows
-        return model.rms(out & own) if out.any() else self.left_out(model).error(own)
-
-    def expected_holdout(self, model: Fit, noise: float) -> float:
-        """What the model itself expects the held-out error to be, as its parameters are known."""
-        if self.held_rows.any():
-            return self._expected(model, self.held_rows, noise)
-        return float(np.hypot(noise, self.left_out(model).uncertain))
-
-    def _expected(self, model: Fit, out: Flags, noise: float, known: Sequence[str] = ()) -> float:
-        """The same of some readings, as if some common parameters were known to be as found."""
-        own = out & self._readings.first
-        return float(np.hypot(noise, model.prediction_std(own, known))) if own.any() else np.nan
-
-    @property
-    def source(self) -> str:
-        """Where held-out errors come from, in words."""
-        if self.held_rows.any():
-            return "holdout runs"
-        if self._several_runs:
-            return "leave one run out"
-        return f"leave one of {CRITERIA.blocks} interleaved parts out"
-
-    @property
-    def _several_runs(self) -> bool:
-        return len(np.unique(self._readings.run[self.rows])) > 1
-
-    def left_out(self, model: Fit) -> CrossValidation:
-        """Runs predicted from other runs; of a single run interleaved parts."""
-        if not self._several_runs:
-            return self.by_stretches(model)
-        key = (model, True)
-        if key not in self._validated:
-            parts = parts_by(self._readings.run, model.used)
-            self._validated[key] = cross_validated(self.experiment, model, parts)
-        return self._validated[key]
-
-    def by_stretches(self, model: Fit) -> CrossValidation:
-        """Interleaved parts of all runs predicted from the rest."""
-        key = (model, False)
-        if key not in self._validated:
-            parts = stretches(self._readings, model.used)
-            # A coefficient that only one of them tells is nothing that the others foretell.
-            self._validated[key] = cross_validated(self.experiment, model, parts, open_ended=True)
-        return self._validated[key]
 
     def _by_chance(self, model: Model, count: int, *, of_others: bool = False) -> float:
         """Scatter over noise that is exceeded by chance once in a thousand.

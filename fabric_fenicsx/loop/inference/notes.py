@@ -6,7 +6,8 @@ from .diagnosis import Beside
 from .effects import Variant
 from .experiment import Another
 from .fitted import Fit
-from .judge import Judge, Model
+from .judge import Judge
+from .model import Model
 from .validation import has_own
 
 __all__ = ["errors_beside", "noise_source", "notes_of"]

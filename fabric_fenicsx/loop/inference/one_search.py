@@ -15,31 +15,22 @@ from collections.abc import Callable, Sequence
 
 from ..kept import Kept
 from .beside import by_itself
-from .choice import (
-    chosen_model,
-    in_place_of,
-    models_instead,
-    verdict_on,
-)
+from .choice import chosen_model, verdict_on
 from .criteria import CRITERIA
-from .curve import Curve, smooth_curve
-from .diagnosis import Candidate, Diagnosis, Verdict
+from .diagnosed import Choice, diagnosed, nearest_of
+from .diagnosis import Candidate, Diagnosis
 from .effects import Effect
 from .experiment import Experiment
 from .first_order import ToFirstOrder
 from .fitted import Fit
 from .hidden import in_specimens
 from .in_common import InCommon
-from .in_scatter import in_scatter
-from .judge import Model
+from .model import Model
 from .models import Models
-from .noise import quantum
-from .notes import errors_beside, noise_source, notes_of
 from .ranking import simplest_first
-from .rivals import InPlace, in_place, pairs_of, rivals_of
+from .rivals import in_place
 from .screen import Screen, Signatures
 from .several import Several
-from .validation import laboratories
 
 __all__ = ["Search"]
 
@@ -110,7 +101,7 @@ class Search:
         candidates, levels = self._looked_through()
         for _ in range(CRITERIA.rounds):
             # An outlier is seen better once the large part of the residual is gone.
-            nearest = _nearest(levels)
+            nearest = nearest_of(levels)
             if self.gave_way or not self.judge.leave_out(nearest.fit):
                 break
             levels = self._with_other_readings(candidates, levels)
@@ -119,7 +110,8 @@ class Search:
         if self.gave_way:
             # What another search has found is reported, with these candidates by themselves.
             levels = levels[:2]
-        chosen, verdict, final, in_their_place = self._chosen_of(levels)
+        choice = self._chosen_of(levels)
+        chosen, final = choice.chosen, choice.final
         self.accounted = self.judge.accounts(chosen, baseline)
         self.doubtful_noise = self.judge.doubtful_noise(chosen)
         self.may_hide_a_term = self.judge.may_hide_a_term(chosen)
@@ -127,64 +119,13 @@ class Search:
         self.may_be_more = chosen.over_two or self.may_be_one_more(chosen)
         if self._screened_first:
             self.may_be_more |= self.judge.may_hide_another(chosen)
-        nearest = _nearest(levels)
         # Held-out runs, by which it may be contradicted, do not say whether to look further.
         self.chosen = final if final.effects else chosen
-        judged = final if verdict != "unexplained" else nearest
-        misfit = self.judge.misfit(judged)
-        curve = self._curve(judged) if verdict == "unexplained" else None
-        of_the_curve = self._of_the_curve(levels) if curve is not None else ()
-        instead = models_instead(self.judge, levels, chosen) if verdict == "unexplained" else {}
-        rivals = rivals_of(self.models, final, in_their_place)
-        one_more = len(chosen.effects) + 1
-        more = levels[one_more] if verdict != "unexplained" and one_more < len(levels) else ()
-        fitted = [(c, c.fit) for c in candidates if c.fit is not None]
-        # Those far behind have not got their own noise and scatter yet.
-        pairs = [(c.effect, fit) for c, fit in fitted]
-        own = self.models.of_one_each(pairs, nearest.criterion)
-        for (candidate, _), model in zip(fitted, own, strict=True):
-            candidate.fit, candidate.criterion = model.fit, model.criterion
-            candidate.holdout = self.judge.holdout(model.fit)
-        self.found = Diagnosis(
-            experiment=self.experiment,
-            verdict=verdict,
-            noise=misfit.noise,
-            noise_source=noise_source(self.judge, misfit.reading),
-            noise_model=judged.estimate.variances.noise,
-            smoothed=misfit.smoothed,
-            quantum=quantum(self.experiment.readings, self.judge.rows),
-            baseline=baseline.fit,
-            final=final.fit,
-            best=nearest.fit if verdict == "unexplained" and nearest.effects else None,
-            instead=tuple(instead.values()),
-            effects=self.models.by_strength(final),
-            rivals=rivals,
-            pairs=[
-                *pairs_of(self.models, final, rivals, of_the_curve),
-                *pairs_of(self.models, chosen, in_place_of(chosen, instead), ()),
-            ],
-            candidates=candidates,
-            holdout_before=self.judge.holdout(baseline.fit),
-            holdout_after=self.judge.holdout(final.fit),
-            holdout_best=self.judge.holdout(nearest.fit),
-            holdout_expected=self.judge.expected_holdout(final.fit, misfit.noise),
-            holdout_source=self.judge.source,
-            white_before=self.judge.misfit(baseline).whiteness,
-            white_after=self.judge.misfit(final).whiteness,
-            outliers=self.judge.outliers,
-            criterion_before=baseline.criterion,
-            criterion_after=final.criterion,
-            curve=curve,
-            of_the_curve=of_the_curve,
-            in_scatter=tuple(in_scatter(self.judge, more, chosen)),
-            others=errors_beside(self.judge, baseline.fit, final.fit, nearest.fit, misfit.noise),
-            laboratories=tuple(laboratories(self.experiment, judged.fit, misfit.noise)),
-            notes=[*self.experiment.notes, *notes_of(self.judge, final, baseline.fit)],
-        )
+        self.found = diagnosed(self.models, candidates, levels, choice)
         return self.found
 
-    def _chosen_of(self, levels: list[list[Model]]) -> tuple[Model, Verdict, Model, InPlace]:
-        """The chosen model, the verdict, what is reported, and what may stand in its place.
+    def _chosen_of(self, levels: list[list[Model]]) -> Choice:
+        """What is chosen among the models.
 
         A fit that was not at its end when models were compared may lose there, and what is tried
         only as a rival may win: then they are compared again.
@@ -196,7 +137,7 @@ class Search:
             )
             verdict = verdict_on(self.judge, levels[0][0], chosen)
             if verdict not in ("effect_found", "effect_discovered"):
-                return chosen, verdict, levels[0][0], {}
+                return Choice(chosen, verdict, levels[0][0], {})
             level = levels[len(chosen.effects)]
             final = self.models.last(chosen)
             self.progress(0.9, "rivals")
@@ -213,7 +154,7 @@ class Search:
                 # Beside what was only tried in the place of another, others may do better.
                 self.several.with_one_less(levels)
                 self.several.exchanged(levels)
-        return chosen, verdict, final, others
+        return Choice(chosen, verdict, final, others)
 
     def _with_other_readings(
         self, candidates: list[Candidate], levels: Sequence[Sequence[Model]]
@@ -273,7 +214,7 @@ class Search:
         if self._screened_first:
             most = self.most or CRITERIA.most_terms
         for count in range(2, 1 + min(most, len(self.effects))):
-            best = _nearest(levels)
+            best = nearest_of(levels)
             if not levels[-1] or (self._settled(best, levels[0][0]) and not best.over_two):
                 break
             # What leaves noise leaves no term far less of it.
@@ -336,12 +277,12 @@ class Search:
         # Sizes of fits that allow for specimens and of those that do not are not compared.
         singles = self.models.ranked(found) + self.models.weighed(alike)
         levels.append(self.models.best_refined(singles))
-        if self._screened_first and not self._settled(_nearest(levels), levels[0][0]):
+        if self._screened_first and not self._settled(nearest_of(levels), levels[0][0]):
             ranked = screen.most_promising(len(tried) + CRITERIA.glimpsed)
-            rest, nearest = ranked[len(tried) :], _nearest(levels).criterion
+            rest, nearest = ranked[len(tried) :], nearest_of(levels).criterion
             later = self._after_a_glimpse(screen, self._signatures, rest, nearest)
             levels[1] = simplest_first([*levels[1], *later])
-        best = _nearest(levels)
+        best = nearest_of(levels)
         if self._of_two and (not self._settled(best, levels[0][0]) or self.judge.uneven(best.fit)):
             of_two = self._over_two_variables(candidates, best.criterion)
             levels[1] = simplest_first([*levels[1], *of_two])
@@ -434,26 +375,8 @@ class Search:
         linear = ToFirstOrder(self.experiment, base, variances, CRITERIA.far)
         return Screen(base, linear, signs)
 
-    def _curve(self, model: Model) -> Curve | None:
-        known = self.experiment.one_curve
-        if known is None:
-            return None
-        readings, rows = self.experiment.readings, model.fit.used
-        return smooth_curve(known, readings, rows, model.estimate.variances, self.judge.given)
-
-    def _of_the_curve(self, levels: Sequence[Sequence[Model]]) -> tuple[str, ...]:
-        """Effects that come as near to the curve as the nearest of them."""
-        singles = levels[1] if len(levels) > 1 else []
-        limit = min((m.criterion for m in singles), default=0.0) + CRITERIA.decisive
-        return tuple(dict.fromkeys(m.effects[0].name for m in singles if m.criterion < limit))
-
 
 def _best_of(effect: Effect, levels: Sequence[Sequence[Model]]) -> Fit | None:
     """The best model of one effect; None where it has none."""
     singles = levels[1] if len(levels) > 1 else ()
     return next((m.fit for m in singles if m.effects == (effect,)), None)
-
-
-def _nearest(levels: Sequence[Sequence[Model]]) -> Model:
-    """The model with the smallest criterion."""
-    return min((m for level in levels for m in level), key=lambda m: m.criterion)

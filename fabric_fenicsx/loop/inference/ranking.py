@@ -9,7 +9,7 @@ import numpy as np
 from .criteria import CRITERIA
 from .first_order import SMALL
 from .fitted import Fit
-from .judge import Model
+from .model import Model
 
 __all__ = ["cancelling", "nearest_forms", "nothing_left", "simplest_first"]
 

@@ -8,7 +8,8 @@ from ...errors import SolveError
 from .criteria import CRITERIA
 from .experiment import Experiment
 from .fitting import fit
-from .judge import Judge, Model
+from .judge import Judge
+from .model import Model
 from .starts import around_jumps
 from .variances import Variances
 

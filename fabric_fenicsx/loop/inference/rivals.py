@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from .criteria import CRITERIA
 from .diagnosis import Pair
 from .effects import Effect
-from .judge import Model
+from .model import Model
 from .models import Models
 from .ranking import nearest_forms
 from .refining import REFINED_WITHIN

@@ -21,7 +21,7 @@ from .experiment import Experiment
 from .fitted import Fit
 from .hidden import in_noise
 from .in_common import InCommon
-from .judge import Model
+from .model import Model
 from .one_search import Search
 from .ranking import nearest_forms
 from .rivals import near
@@ -188,10 +188,12 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
             several = _several(further, final.criterion)
             if several is not None and not _alike(several.effects, chosen.effects):
                 return _beside(several, found)
-            if slow and several is None and _beaten(further, final):
-                # Nor where held-out runs contradict them.
-                assert further.found is not None
-                return _beside(further.found, found)
+            if slow and several is None:
+                terms = further.chosen
+                assert terms is not None and further.found is not None
+                if _likelier(further, terms.criterion, final.criterion):
+                    # Nor where held-out runs contradict them.
+                    return _beside(further.found, found)
     if len(found.effects) == 1 and doubt.rivals:
         _name_terms(search, final, single)
     return found
@@ -230,15 +232,18 @@ def _several(further: Search, criterion: float) -> Diagnosis | None:
     """What several terms explain, if that is decidedly better than a criterion."""
     further.most = None
     found = further.run()
-    better = found.criterion_after < criterion - CRITERIA.decisive
-    return found if further.accounted and better else None
+    return found if _likelier(further, found.criterion_after, criterion) else None
 
 
-def _beaten(further: Search, final: Model) -> bool:
-    """Whether terms account for the fitted readings, and are decidedly likelier than a model."""
-    chosen = further.chosen
-    better = chosen is not None and chosen.criterion < final.criterion - CRITERIA.decisive
-    return bool(further.accounted and better)
+def _likelier(further: Search, its: float, criterion: float) -> bool:
+    """Whether what terms account for the fitted readings by is decidedly likelier.
+
+    Args:
+        further: the search for them.
+        its: criterion of theirs.
+        criterion: of another model.
+    """
+    return further.accounted and its < criterion - CRITERIA.decisive
 
 
 def _alike(several: Sequence[Effect], named: Sequence[Effect]) -> bool:

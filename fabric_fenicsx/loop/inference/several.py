@@ -13,7 +13,7 @@ from .effects import Effect, Variant
 from .first_order import Combination
 from .fitted import Fit
 from .fitting import fit
-from .judge import Model
+from .model import Model
 from .models import Models
 from .ranking import nothing_left
 from .screen import Screen

@@ -9,7 +9,7 @@ from scipy.stats import chi2, norm
 
 from .criteria import CRITERIA
 from .effects import Effect, Variant
-from .judge import Model
+from .model import Model
 
 __all__ = ["significant"]
 

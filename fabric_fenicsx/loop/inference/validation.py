@@ -36,6 +36,9 @@ class CrossValidation:
         off: what the predictions miss of each reading, times its weight, (n,); NaN of those that
             were in no part, or in one that could not be predicted.
         predictive: the same over sigma, less what predictions allow for; see Fit.predictive_rms.
+        beside: the same, or what the parts add to what the others leave, where that is less: of a
+            model far from linear the others may allow for what they do not expect. Of interleaved
+            parts it is the same.
         uncertain: standard error of the predictions of the first quantity, root mean square, as
             their parameters are known and specimens differ; NaN where there are none.
         parts: that were left out in turn.
@@ -45,6 +48,7 @@ class CrossValidation:
 
     off: npt.NDArray[np.float64]
     predictive: float
+    beside: float
     uncertain: float
     parts: int
     failed: int
@@ -89,41 +93,48 @@ def cross_validated(
         open_ended: see Fit.predictive_rms.
     """
     off = np.full(len(model.used), np.nan)
-    allowed, uncertain, count, failed = 0.0, 0.0, 0, 0
-    first, counted = experiment.readings.first, 0
+    predictive: list[tuple[float, int]] = []
+    beside, uncertain = predictive.copy(), predictive.copy()
+    first, failed = experiment.readings.first, 0
     for part in parts:
         again = fitted_without(experiment, model, part)
         if again is None:
             failed += 1
             continue
-        size = int(part.sum())
+        size, own = int(part.sum()), part & first
         off[part] = (again.residual * again.readings.weight)[part]
         left = size * again.predictive_rms(part, open_ended=open_ended) ** 2
+        predictive.append((left, size))
         if not open_ended:
-            left = min(left, _beside_the_others(experiment, model, again, part, left))
-        allowed += left
-        count += size
-        own = part & first
+            left = _beside_the_others(experiment, model, again, part, left)
+        beside.append((left, size))
         if own.any():
-            uncertain += int(own.sum()) * again.prediction_std(own) ** 2
-            counted += int(own.sum())
+            known = int(own.sum())
+            uncertain.append((known * again.prediction_std(own) ** 2, known))
     return CrossValidation(
-        off, _root_mean(allowed, count), _root_mean(uncertain, counted), len(parts), failed
+        off,
+        _root_mean(predictive),
+        _root_mean(beside),
+        _root_mean(uncertain),
+        parts=len(parts),
+        failed=failed,
     )
 
 
-def _root_mean(total: float, count: int) -> float:
-    return float(np.sqrt(total / count)) if count else float("nan")
+def _root_mean(squares: Sequence[tuple[float, int]]) -> float:
+    """Root of the mean of sums of squares, of so many each; NaN of none."""
+    count = sum(size for _, size in squares)
+    return float(np.sqrt(sum(of for of, _ in squares) / count)) if count else float("nan")
 
 
 def _beside_the_others(
     experiment: Experiment, model: Fit, others: Fit, part: Flags, left: float
 ) -> float:
-    """Sum of squares that a part adds to what the others leave.
+    """Sum of squares that a part adds to what the others leave, where that is less than foreseen.
 
-    To first order that is what it leaves less what their prediction allows for. Of a model far from
-    linear they may allow for what they do not expect: a gap that they hardly touch is as wide as it
-    is found with this part, although they alone would have it narrow.
+    To first order they are the same: what it leaves less what the others' prediction allows for. Of
+    a model far from linear they may allow for what they do not expect: a gap that they hardly touch
+    is as wide as it is found with this part, although they alone would have it narrow.
 
     Args:
         experiment: the test.
@@ -135,8 +146,8 @@ def _beside_the_others(
     if model.sum_of_squares - others.sum_of_squares < left and not others.converged:
         # What they leave in the end is less.
         others = fitted_without(experiment, others, part, CRITERIA.evaluations) or others
-    more = model.sum_of_squares - others.sum_of_squares
-    return max(more, 0.0) if others.converged else left
+    more = max(model.sum_of_squares - others.sum_of_squares, 0.0)
+    return min(left, more) if others.converged else left
 
 
 def fitted_without(
