@@ -254,15 +254,20 @@ def test_bundles_side_by_side_are_near_any_bending(at, share):
     assert best < 0.02
 
 
-def test_a_soft_gap_becomes_every_gap_and_none():
-    variant = named(PICTURE_FRAME_EFFECTS, "crosshead_backlash", "soft gap")
-    D = np.linspace(-1.0, 1.0, 81)
+def travels(form, D):
+    """What a form of the free travel makes of the crosshead's, by its three numbers."""
+    variant = named(PICTURE_FRAME_EFFECTS, "crosshead_backlash", form)
 
-    def travel(out, back, width):
-        names = ("free_travel_out_mm", "free_travel_back_mm", "gap_rounding_mm")
-        p = dict(zip(names, (out, back, width), strict=True))
+    def travel(*numbers):
+        p = dict(zip((p.name for p in variant.parameters), numbers, strict=True))
         return np.array([evaluated(variant.travel(p, as_ufl(float(d)), None)) for d in D])
 
+    return travel
+
+
+def test_a_soft_gap_becomes_every_gap_and_none():
+    D = np.linspace(-1.0, 1.0, 81)
+    travel = travels("soft gap", D)
     for width in (1e-4, 0.05):
         assert travel(0.0, 0.0, width) == pytest.approx(D, abs=1e-14)
     for out, back in ((0.2, 0.2), (0.2, 0.0), (0.0, 0.1)):
@@ -271,6 +276,19 @@ def test_a_soft_gap_becomes_every_gap_and_none():
         assert travel(out, back, 1e-4) == pytest.approx(gap, abs=2.001e-4 * np.log(2.0))
         soft = travel(out, back, 0.03)
         assert soft[40] == 0.0 and (np.diff(soft) > 0.0).all()
+
+
+def test_a_free_travel_that_is_taken_up_gradually_never_goes_back():
+    """D − b (1 − e^(−|D|/(d + b))) to each side: b is missing in the end, of which d is none."""
+    D = np.linspace(-4.0, 4.0, 161)
+    travel = travels("taken up gradually", D)
+    assert travel(0.0, 0.0, 0.1) == pytest.approx(D, abs=1e-14)
+    for out, back, d in ((0.3, 0.1, 0.2), (0.2, 0.0, 0.05), (0.3, 0.2, 0.0)):
+        taken = travel(out, back, d)
+        assert taken[80] == 0.0 and (np.diff(taken) > 0.0).all()
+        assert taken[[0, -1]] == pytest.approx([-4.0 + back, 4.0 - out], abs=1e-3)
+        at = D[100]
+        assert taken[100] == pytest.approx(at - out * (1.0 - np.exp(-at / (d + out))), rel=1e-8)
 
 
 def test_what_laws_share_is_fitted_once():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from linear import Linear, linear_effect, readings
 from scipy.signal import lfilter
+from scipy.stats import norm
 
 from fabric_fenicsx.inputs.parameters import Parameter
 from fabric_fenicsx.loop.inference.effects import Effect, Variant
@@ -24,6 +25,30 @@ SIGMA = 0.1
 NOISE = Variances(Noise(SIGMA))
 #: Of a wave.
 WAVE = Parameter("wave", (), amplitude=True)
+
+
+@pytest.mark.parametrize("zeros", [(0.3, -0.2, 0.1), (0.02, -0.01, 0.015), (3.0, 2.5, -4.0)])
+def test_zeros_of_runs_cost_what_draws_of_one_scatter_do(zeros):
+    """−2 log of their normal density about nothing over that of the likelihood at its largest."""
+    s = 0.1
+    names = [f"run{k}_zero" for k in range(3)]
+    form = Variant("zeros", tuple(Parameter(n, amplitude=True) for n in names), zeros=True)
+    effect = Effect("offset", "linear", "", (form,))
+    test = Linear(readings(np.zeros(400)), {"a": np.ones(400)}, ("a",), effects=[effect])
+    model = SimpleNamespace(
+        variants=(form,),
+        values=dict(zip(("a", *names), (1.0, *zeros), strict=True)),
+        std=dict.fromkeys(names, s),
+        at_bound=(),
+        used=np.ones(400, dtype=bool),
+    )
+    scatter = np.sqrt(max(np.mean(np.square(zeros)) - s**2, 0.0))
+    density = norm(0.0, np.hypot(scatter, s)).logpdf(zeros) - norm(0.0, s).logpdf(0.0)
+    cost = Judge(test, [effect]).cost(model, (effect,))
+    assert cost == pytest.approx(np.log(400) - 2.0 * density.sum() + np.log(3))
+    assert (cost < 4.0 * np.log(400)) is (max(zeros) < 1.0)
+    known = SimpleNamespace(**(vars(model) | {"std": dict.fromkeys(names, np.inf)}))
+    assert Judge(test, [effect]).cost(known, (effect,)) == pytest.approx(np.log(400))
 
 
 def judged(acts_on="", since=0.5, stated=SIGMA, scatter=SIGMA, size=1.0):

@@ -2,6 +2,8 @@
 
     criterion = −2 log L + k ln n + 2 Σ ln(forms of the effect) + 2 ln(sets of as many effects)
 
+Zeros of runs, which are drawn rather than chosen, cost what their scatter does.
+
 L is the likelihood with specimens' deviations integrated out and the noise as the model itself
 leaves it (see variances): an approximation to −2 log of its evidence (Schwarz, Ann. Stat. 6, 1978),
 with the chance of finding something among so many forms allowed for. A model explains the data if
@@ -11,7 +13,7 @@ was not; noise is what is printed. Holdout runs are looked at for that alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from math import comb, log
 
 import numpy as np
@@ -136,10 +138,12 @@ class Judge(HeldOut):
         """What a model pays for its parameters and for the number of its kind."""
         # What is nothing costs nothing; a place or a time at the end of its range was looked for.
         sought = {p.name for variant in model.variants for p in variant.shapes}
-        free = len(model.values) - len(set(model.at_bound) - sought)
+        zeros = [p.name for variant in model.variants if variant.zeros for p in variant.parameters]
+        free = len(model.values) - len({*model.at_bound, *zeros} - sought)
         forms = sum(log(max(len(effect.variants), 1)) for effect in effects)
         sets = log(max(comb(len(self._effects), len(effects)), 1))
-        return free * log(max(int(model.used.sum()), 2)) + 2.0 * (forms + sets)
+        drawn = _of_the_drawn([(model.values[name], model.std[name]) for name in zeros])
+        return free * log(max(int(model.used.sum()), 2)) + drawn + 2.0 * (forms + sets)
 
     # Verdict ------------------------------------------------------------------------------
 
@@ -398,6 +402,23 @@ class Judge(HeldOut):
             ratio = float(np.sqrt(f_ratio.isf(1e-3, independent, known)))
             return min(ratio, CRITERIA.significant)
         return float(np.sqrt(chi2.isf(1e-3, independent) / independent))
+
+
+def _of_the_drawn(zeros: Sequence[tuple[float, float]]) -> float:
+    """−2 log of what zeros of runs cost, which are draws of one scatter τ about nothing.
+
+    With s their standard errors Σ [ln(1 + τ²/s²) + z²/(τ² + s²)] + ln(how many), for τ itself: what
+    is left of the largest likelihood with the zeros integrated out (Laplace).
+
+    Args:
+        zeros: each with its standard error; infinite or none where nothing is known of it.
+    """
+    known = np.array([(z, s) for z, s in zeros if 0.0 < s < np.inf])
+    if not len(known):
+        return 0.0
+    z, s2 = known[:, 0], known[:, 1] ** 2
+    tau2 = max(float(np.mean(z**2 - s2)), 0.0)
+    return float(np.sum(np.log1p(tau2 / s2) + z**2 / (tau2 + s2))) + log(len(known))
 
 
 def _terms_of(model: Model) -> list[Variant]:

@@ -53,6 +53,14 @@ ROUNDING = Parameter(
     meaning="travel over which it engages",
     share_of="travel",
 )
+TAKE_UP = Parameter(
+    "take_up_mm",
+    (0.01, 0.05, 0.2),
+    0.0,
+    0.5,
+    meaning="crosshead travel, and the free travel itself, over which that is taken up",
+    share_of="travel",
+)
 
 GOING_BACK = Parameter(
     "going_back_s",
@@ -100,6 +108,17 @@ def _soft_gap(p: Values, D: Any, past: Any) -> Any:
     return engaged(D - out) - engaged(-D - back) - (engaged(-out) - engaged(-back))
 
 
+def _taken_up(p: Values, D: Any, past: Any) -> Any:
+    """Free travel b that the frame takes up as it goes, b (1 − e^(−|D|/(d + b))): never back."""
+    d = p[TAKE_UP.name]
+
+    def taken(b: Any, way: Any) -> Any:
+        return b * (1 - exp(-way / (d + b + 1e-9)))
+
+    out, back = p["free_travel_out_mm"], p["free_travel_back_mm"]
+    return D - taken(out, max_value(D, 0)) + taken(back, max_value(-D, 0))
+
+
 def _gap(p: Values, D: Any, past: Any) -> Any:
     """D − b where the frame is pulled, D where it is pushed, and in between there is no force.
 
@@ -138,6 +157,7 @@ PICTURE_FRAME_EFFECTS = (
                 goes_back=GOING_BACK.name,
             ),
             FrameVariant("soft gap", (OUT, BACK, ROUNDING), travel=_soft_gap),
+            FrameVariant("taken up gradually", (OUT, BACK, TAKE_UP), travel=_taken_up),
             FrameVariant(
                 "play, each side its own",
                 (OUT, BACK),
