@@ -46,7 +46,7 @@ def test_zeros_of_runs_cost_what_draws_of_one_scatter_do(zeros):
     density = norm(0.0, np.hypot(scatter, s)).logpdf(zeros) - norm(0.0, s).logpdf(0.0)
     cost = Judge(test, [effect]).cost(model, (effect,))
     assert cost == pytest.approx(np.log(400) - 2.0 * density.sum() + np.log(3))
-    assert (cost < 4.0 * np.log(400)) is (max(zeros) < 1.0)
+    assert (cost < 4.0 * np.log(400)) == (max(zeros) < 1.0)
     known = SimpleNamespace(**(vars(model) | {"std": dict.fromkeys(names, np.inf)}))
     assert Judge(test, [effect]).cost(known, (effect,)) == pytest.approx(np.log(400))
 
