@@ -215,7 +215,13 @@ class Search:
             most = self.most or CRITERIA.most_terms
         for count in range(2, 1 + min(most, len(self.effects))):
             best = nearest_of(levels)
-            if not levels[-1] or (self._settled(best, levels[0][0]) and not best.over_two):
+            if not levels[-1]:
+                break
+            if self._settled(best, levels[0][0]) and not best.over_two:
+                zeros = self._with_zeros(best)
+                if zeros and zeros[0].criterion < best.criterion - CRITERIA.decisive:
+                    # They hide in what it takes for noise.
+                    levels.append(zeros)
                 break
             # What leaves noise leaves no term far less of it.
             quiet = self.judge.settled(best, levels[0][0])
@@ -232,15 +238,19 @@ class Search:
 
         Zeros are of the readings (see zeros): with them it is no more than a single effect.
         """
+        return any(self.judge.settled(one, baseline) for one in self._with_zeros(model))
+
+    def _with_zeros(self, model: Model) -> list[Model]:
+        """A model of one effect with a zero of each run, the best first; none of another one."""
         with_zeros = [e for e in self.effects if any(v.zeros for v in e.variants)]
-        if len(model.effects) != 1 or not with_zeros or model.effects[0] in with_zeros:
-            return False
+        if len(model.effects) != 1 or self._screened_first or model.effects[0] in with_zeros:
+            return []
         found: list[Fit] = []
         for base in self.models.with_solutions([model]):
             every = self.models.beside(base, with_zeros)
             own = [one for one in every if all(variant.zeros for variant, _ in one)]
             found += self.models.fitted(own, starts=1, base=base)
-        return any(self.judge.settled(one, baseline) for one in self.models.ranked(found))
+        return self.models.ranked(found)
 
     def _alone(self) -> tuple[list[Candidate], list[list[Model]]]:
         """Candidates by themselves, and models of no effect and of one."""

@@ -103,8 +103,7 @@ def _doubt(search: Search, further: Search) -> _Doubt | None:
     """
     chosen, experiment = search.chosen, search.experiment
     assert chosen is not None
-    zeros = zeros_of_noise(chosen.effects, chosen.fit)
-    own = [effect.name for effect in chosen.effects if zeros is None or effect is not zeros[0]]
+    own = [effect.name for effect in _but_zeros(chosen)]
     alike = {name for effect in own for name in experiment.imitated.get(effect, ())}
     in_its_way = experiment.each_its_own_way and search.specimens_differ
     doubtful = in_its_way or search.judge.uneven(chosen.fit)
@@ -179,9 +178,10 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
                 # Held-out runs contradict it, which does not make a misfit noise.
                 return _beside(_or_several(single, further, preferred.criterion), found)
     else:
-        doubted = len(chosen.effects) > 1 and search.doubtful_noise
+        count = len(_but_zeros(chosen))
+        doubted = count > 1 and search.doubtful_noise
         # Three with names may imitate one of them and a term.
-        doubted |= len(chosen.effects) > CRITERIA.most_terms or further.may_be_one_more(final)
+        doubted |= count > CRITERIA.most_terms or further.may_be_one_more(final)
         slow = search.judge.slow_noise(final)
         if doubted or slow:
             # It may be a misfit: what several terms explain instead is not said to be noise.
@@ -197,6 +197,12 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
     if len(found.effects) == 1 and doubt.rivals:
         _name_terms(search, final, single)
     return found
+
+
+def _but_zeros(model: Model) -> list[Effect]:
+    """Effects of a model but that of zeros which scatter about nothing."""
+    zeros = zeros_of_noise(model.effects, model.fit)
+    return [effect for effect in model.effects if zeros is None or effect is not zeros[0]]
 
 
 def _that_leaves_noise(search: Search) -> Fit | None:
