@@ -308,7 +308,6 @@ def test_signs_of_general_forms_are_those_of_physics():
             if len(variant.amplitudes) > 1 and effect.name not in (
                 "tension_coupling",
                 "load_drift",
-                "residual_curvature",
             ):
                 assert all(p.one_sided for p in variant.amplitudes)
     for one in Locking.forms:

@@ -72,10 +72,6 @@ CHANGE = Parameter(
     share_of="per_length",
 )
 """Along the longest strip it becomes up to three times, or a third: a roll's has no peak."""
-AT_THE_CLAMP = replace(UNLOADED, meaning="curvature unloaded at the clamp, up positive")
-PER_LENGTH = Parameter(
-    "kappa1_1_mm2", amplitude=True, meaning="by what it grows for each mm along the strip"
-)
 
 COMPLIANCE = Parameter(
     "compliance_rad_per_N",
@@ -130,13 +126,8 @@ CANTILEVER_EFFECTS = (
             StripVariant("constant", (UNLOADED,), unloaded=lambda p: p["kappa0_1_mm"]),
             StripVariant(
                 "growing along the strip",
-                (AT_THE_CLAMP, CHANGE),
+                (replace(UNLOADED, meaning="curvature unloaded at the clamp, up positive"), CHANGE),
                 added_curvature=lambda p, at: p["kappa0_1_mm"] * exp(p["change_1_mm"] * at["s"]),
-            ),
-            StripVariant(
-                "linear along the strip",
-                (AT_THE_CLAMP, PER_LENGTH),
-                added_curvature=lambda p, at: p["kappa0_1_mm"] + p["kappa1_1_mm2"] * at["s"],
             ),
         ),
         of_fabric=False,
