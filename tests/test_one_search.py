@@ -438,6 +438,33 @@ def test_a_term_is_looked_for_before_several_effects_with_names(
     assert bool(with_names_alone) == tried
 
 
+@pytest.mark.parametrize("size", [0.5, 0.03])
+def test_no_term_is_asked_for_where_zeros_of_runs_are_all_that_lacks(monkeypatch, size):
+    """Beside an effect with a name; also where they hide in noise that goes together."""
+    zeros = size * np.array([1.0, -1.2, 0.9, -0.8, 1.1, -1.0])[:RUNS]
+    of_run = np.repeat(np.eye(RUNS), EACH, axis=0)
+    columns = {f"zero{k}": lambda t, k=k: of_run[:, k] for k in range(RUNS)}
+    amplitudes = tuple(Parameter(name, amplitude=True) for name in columns)
+    columns["wave"] = lambda t: np.sin(9.0 * t)
+    columns["kink"] = lambda t: np.maximum(t - 0.6, 0.0)
+    # Zeros and a constant of all runs are not told apart: the baseline has none.
+    columns["a"] = lambda t: 5.0 * t**2
+    offset = Effect("offset", "linear", "", (Variant("zeros", amplitudes, zeros=True),))
+    test = made(
+        columns,
+        lambda t: columns["a"](t) - 10.0 + 0.4 * columns["wave"](t) + of_run @ zeros,
+        [linear_effect("wave"), offset],
+        specimen=np.zeros(RUNS * EACH, dtype=np.int64),
+    )
+    test.terms, test.terms_are_rivals = [linear_effect("kink", acts_on="reading")], False
+    asked = []
+    monkeypatch.setattr(Search, "finds_what_several_do_not", lambda *of: asked.append(of))
+    found = diagnose_test(test)
+    assert found.verdict == "effect_found" and not asked
+    assert [effect.name for effect in found.effects] == ["wave"]
+    assert found.zeros == pytest.approx(np.sqrt(np.mean(zeros**2)), rel=0.3)
+
+
 @pytest.mark.parametrize("doubtful", [True, False])
 def test_a_term_that_leaves_doubtful_noise_is_not_all(monkeypatch, doubtful):
     """Although effects with names leave far more together: others are tried beside it."""

@@ -218,7 +218,7 @@ class Search:
             if not levels[-1]:
                 break
             if self._settled(best, levels[0][0]) and not best.over_two:
-                zeros = self._with_zeros(best)
+                zeros = self._with_zeros(best) if len(levels) == 2 else []
                 if zeros and zeros[0].criterion < best.criterion - CRITERIA.decisive:
                     # They hide in what it takes for noise.
                     levels.append(zeros)
@@ -236,8 +236,11 @@ class Search:
     def _lacks_only_zeros(self, model: Model, baseline: Model) -> bool:
         """Whether a model of one effect leaves noise once each run has a zero of its own.
 
-        Zeros are of the readings (see zeros): with them it is no more than a single effect.
+        Zeros are of the readings (see zeros): with them it is no more than a single effect. And
+        where they are the nearest of all it is beside them that something lacks.
         """
+        if len(model.effects) == 1 and model.fit.variants[0].zeros:
+            return True
         return any(self.judge.settled(one, baseline) for one in self._with_zeros(model))
 
     def _with_zeros(self, model: Model) -> list[Model]:
