@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Effect, Variant
-from .experiment import Experiment, each_by_itself
+from .experiment import each_by_itself
 from .fits import Fits
 from .fitted import Fit, soft_size
 from .fitting import fit, parameters_of
-from .in_common import InCommon
 from .model import Model
 from .ranking import cancelling, nearest_forms, nothing_left, simplest_first
 from .refining import REFINED_WITHIN, fitted_to_the_end, refined
@@ -32,23 +32,12 @@ QUIETER, AGAIN, AGAIN_OF_A_SET = 0.8, 12, 4
 
 
 class Models(Fits):
-    """Weighs and ranks what is fitted of a test; see Fits.
+    """Weighs and ranks what is fitted of a test; see Fits."""
 
-    Args:
-        experiment: the test.
-        effects: that may be in a model.
-        common: to all that fit models of this test; by default to this one alone.
-    """
-
-    def __init__(
-        self,
-        experiment: Experiment,
-        effects: Sequence[Effect],
-        common: InCommon | None = None,
-    ) -> None:
-        super().__init__(experiment, effects, common)
-        #: Models that were fitted again with their own variances.
-        self._refined: set[Model] = set()
+    @cached_property
+    def _refined(self) -> set[Model]:
+        """Models that were fitted again with their own variances."""
+        return set()
 
     def weighed(self, found: Sequence[Fit]) -> list[Model]:
         """Models with their criteria, the best first.
