@@ -2,13 +2,12 @@
 
     criterion = −2 log L + k ln n + 2 Σ ln(forms of the effect) + 2 ln(sets of as many effects)
 
-Zeros of runs, which are drawn rather than chosen, cost what their scatter does.
-
 L is the likelihood with specimens' deviations integrated out and the noise as the model itself
 leaves it (see variances): an approximation to −2 log of its evidence (Schwarz, Ann. Stat. 6, 1978),
-with the chance of finding something among so many forms allowed for. A model explains the data if
-its residual is noise, in size and in structure, in the readings it was fitted to and in those it
-was not; noise is what is printed. Holdout runs are looked at for that alone.
+with the chance of finding something among so many forms allowed for. Zeros of runs, which are drawn
+rather than chosen, cost what their scatter does. A model explains the data if its residual is
+noise, in size and in structure, in the readings it was fitted to and in those it was not; noise is
+what is printed. Holdout runs are looked at for that alone.
 """
 
 from __future__ import annotations

@@ -31,6 +31,7 @@ from .ranking import simplest_first
 from .rivals import in_place
 from .screen import Screen, Signatures
 from .several import Several
+from .zeros import in_zeros_alone
 
 __all__ = ["Search"]
 
@@ -245,14 +246,15 @@ class Search:
 
     def _with_zeros(self, model: Model) -> list[Model]:
         """A model of one effect with a zero of each run, the best first; none of another one."""
-        with_zeros = [e for e in self.effects if any(v.zeros for v in e.variants)]
-        if len(model.effects) != 1 or self._screened_first or model.effects[0] in with_zeros:
+        zeros = in_zeros_alone(self.effects)
+        if len(model.effects) != 1 or self._screened_first:
+            return []
+        if model.effects[0].name in {effect.name for effect in zeros}:
             return []
         found: list[Fit] = []
         for base in self.models.with_solutions([model]):
-            every = self.models.beside(base, with_zeros)
-            own = [one for one in every if all(variant.zeros for variant, _ in one)]
-            found += self.models.fitted(own, starts=1, base=base)
+            beside = self.models.beside(base, zeros)
+            found += self.models.fitted(beside, starts=1, base=base)
         return self.models.ranked(found)
 
     def _alone(self) -> tuple[list[Candidate], list[list[Model]]]:

@@ -94,7 +94,8 @@ def cross_validated(
     """
     off = np.full(len(model.used), np.nan)
     predictive: list[tuple[float, int]] = []
-    beside, uncertain = predictive.copy(), predictive.copy()
+    beside: list[tuple[float, int]] = []
+    uncertain: list[tuple[float, int]] = []
     first, failed = experiment.readings.first, 0
     for part in parts:
         again = fitted_without(experiment, model, part)

@@ -20,7 +20,13 @@ from .diagnosis import Diagnosis
 from .effects import Effect, Variant
 from .fitted import Fit
 
-__all__ = ["scatter_about_nothing", "with_zeros_as_noise", "with_zeros_of_terms", "zeros_of_noise"]
+__all__ = [
+    "in_zeros_alone",
+    "scatter_about_nothing",
+    "with_zeros_as_noise",
+    "with_zeros_of_terms",
+    "zeros_of_noise",
+]
 
 
 def scatter_about_nothing(zeros: list[float]) -> bool:
@@ -32,15 +38,15 @@ def scatter_about_nothing(zeros: list[float]) -> bool:
     return len(zeros) > 1 and float(ttest_1samp(zeros, 0.0).pvalue) > level
 
 
+def in_zeros_alone(effects: Sequence[Effect]) -> list[Effect]:
+    """Those of some effects that have zeros of runs among their forms, in these alone."""
+    of_each = [(e, tuple(v for v in e.variants if v.zeros)) for e in effects]
+    return [replace(effect, variants=zeros) for effect, zeros in of_each if zeros]
+
+
 def with_zeros_of_terms(listed: Sequence[Effect], terms: Sequence[Effect]) -> list[Effect]:
     """Effects with a name, and zeros of runs where only terms without a formula have them."""
-
-    def zeros(effect: Effect) -> tuple[Variant, ...]:
-        return tuple(variant for variant in effect.variants if variant.zeros)
-
-    if any(map(zeros, listed)):
-        return [*listed]
-    return [*listed, *(replace(term, variants=zeros(term)) for term in terms if zeros(term))]
+    return [*listed, *(() if in_zeros_alone(listed) else in_zeros_alone(terms))]
 
 
 def zeros_of_noise(effects: Sequence[Effect], model: Fit) -> tuple[Effect, Variant] | None:
