@@ -13,15 +13,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array, Integers
 from .crossings import crossings_by_tow, node_tows
 from .net import Net
 
 __all__ = ["TowAxes", "axes_shear", "shear_at", "tow_axes"]
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: Places to either side of a crossing that its slope is taken from.
 REACH = 2
@@ -41,9 +39,9 @@ class TowAxes:
         weights: of their coordinates [1/mm], (n_crossings, 2, m, 3).
     """
 
-    points: Floats
+    points: Array
     nodes: Integers
-    weights: Floats
+    weights: Array
 
     @classmethod
     def of(
@@ -89,7 +87,7 @@ class TowAxes:
         """
         return TowAxes(self.points[nodes], np.searchsorted(nodes, self.nodes), self.weights)
 
-    def at(self, displacement: Floats) -> Floats:
+    def at(self, displacement: Array) -> Array:
         """Unit tangents of warp and weft at each crossing, along the tows' senses.
 
         Args:
@@ -104,13 +102,13 @@ class TowAxes:
 
 
 def tow_axes(
-    net: Net, displacement: Floats, *, symmetry: Sequence[int] = (), reach: int = REACH
-) -> Floats:
+    net: Net, displacement: Array, *, symmetry: Sequence[int] = (), reach: int = REACH
+) -> Array:
     """Unit tangents of warp and weft at each crossing of a net, see TowAxes."""
     return TowAxes.of(net, symmetry, reach).at(displacement)
 
 
-def axes_shear(axes: Floats) -> Floats:
+def axes_shear(axes: Array) -> Array:
     """How far the angle from weft to warp falls short of 90° [rad], (n_crossings,), signed.
 
     arcsin(s·t), with t the warp's and s the weft's axis: the shear angle γ of a sheet whose tows
@@ -121,7 +119,7 @@ def axes_shear(axes: Floats) -> Floats:
     return np.arctan2(cosine, np.linalg.norm(np.cross(weft, warp), axis=1))
 
 
-def shear_at(net: Net, shear: Floats, places: Floats, *, quarter: bool) -> Floats:
+def shear_at(net: Net, shear: Array, places: Array, *, quarter: bool) -> Array:
     """A signed angle at places on the flat sheet, from its values at the crossings.
 
     Cubic and once continuously differentiable between them (Clough and Tocher), the nearest
@@ -163,7 +161,7 @@ def shear_at(net: Net, shear: Floats, places: Floats, *, quarter: bool) -> Float
 
 def _on_tow(
     net: Net, line: Integers, ends: Integers, symmetry: Sequence[int], reach: int
-) -> tuple[Integers, Floats]:
+) -> tuple[Integers, Array]:
     """Nodes (n, m) and weights (n, m, 3) of the n crossings of a tow, in its order."""
     place = net.points[line]
     s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
@@ -173,7 +171,7 @@ def _on_tow(
         outer = line[0] if first else line[-1]
         gap = float(np.linalg.norm(net.points[end] - net.points[outer]))
         start = s[0] - gap if first else s[-1] + gap
-        more: list[tuple[int, float, Floats, bool]] = []
+        more: list[tuple[int, float, Array, bool]] = []
         near = IN_PLANE * np.ptp(net.points)
         # A tow that lies in a plane does not end in it.
         far = np.abs(net.points[ends]).max(axis=0)
@@ -214,7 +212,7 @@ def _on_tow(
     return nodes, weights
 
 
-def _slope_weights(x: Floats) -> Floats:
+def _slope_weights(x: Array) -> Array:
     """Weights of the values at x (n, m) in the slopes at 0 of the polynomials through them."""
     scale = np.abs(x).max(axis=1, keepdims=True)
     # Rows x⁰, x¹, x², ...

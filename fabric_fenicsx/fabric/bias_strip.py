@@ -29,13 +29,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array
 from .layout import TowFamily, TowLayout
 from .outline import Polygon, rectangle
 from .paths import ROUNDING, check_size
 
 __all__ = ["BiasStrip"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +62,7 @@ class BiasStrip:
             )
 
     @property
-    def tows(self) -> tuple[Floats, Floats]:
+    def tows(self) -> tuple[Array, Array]:
         """Unit vectors s₀ of the weft and t₀ of the warp, (2,) each."""
         cosine, sine = np.cos(np.radians(self.bias)), np.sin(np.radians(self.bias))
         return np.array([cosine, sine]), np.array([-sine, cosine])
@@ -127,7 +126,7 @@ class BiasStrip:
         """Of the strip across its warp and across its weft [mm]."""
         return [float(np.ptp(self.outline.extent(axis))) for axis in self.tows]
 
-    def gripped(self, points: Floats) -> npt.NDArray[np.int64]:
+    def gripped(self, points: Array) -> npt.NDArray[np.int64]:
         """How many of the two tows of a place end in a clamp: 0 in zone A, 1 in B, 2 in C, (n,).
 
         Args:
@@ -139,7 +138,7 @@ class BiasStrip:
         ]
         return np.sum(held, axis=0)
 
-    def borders(self) -> list[Floats]:
+    def borders(self) -> list[Array]:
         """The borders of the zones [mm], (2, 2) each: tows through the corners, edge to edge."""
         (s, t), (p, q) = self.tows, self.free
         found = []
@@ -161,7 +160,7 @@ class BiasStrip:
         sine = (square - p**2 - q**2) / (2.0 * p * q)
         return np.arcsin(np.where(np.abs(sine) <= 1.0, sine, np.nan))
 
-    def places(self, points: Floats, travel: float) -> Floats:
+    def places(self, points: Array, travel: float) -> Array:
         """Where constant shear in each zone takes places of the strip [mm], (n, 3).
 
         Args:
@@ -182,7 +181,7 @@ class BiasStrip:
             places[:, :2] += np.outer(inside, free) + np.outer(along - inside, held)
         return places
 
-    def force(self, moment: Callable[[Floats], Floats], gamma: Floats) -> Floats:
+    def force(self, moment: Callable[[Array], Array], gamma: Array) -> Array:
         """Force F [N] that does the work of the zones' moments, F dd = Σ A_zone m dγ_zone, at 45°.
 
         With the areas W (2 L − 3 W)/2 of A and W² of B, and dd = D (cos γ/2 − sin γ/2)/2 dγ:
@@ -204,7 +203,7 @@ class BiasStrip:
         work = middle * moment(gamma) + sides * moment(gamma / 2.0) / 2.0
         return work / self.pull(gamma)
 
-    def moment(self, gamma: Floats, force: Floats) -> Floats:
+    def moment(self, gamma: Array, force: Array) -> Array:
         """Moment per area m(γ) [N/mm] of a measured curve by the same balance of energy, at 45°.
 
             m(γ) = g(γ) − ρ m(γ/2),    ρ = W/(2 L − 3 W),
@@ -230,7 +229,7 @@ class BiasStrip:
             factor, angle = -ratio * factor, angle / 2.0
         return moment
 
-    def shares(self, points: Floats, spacings: tuple[float, float]) -> Floats:
+    def shares(self, points: Array, spacings: tuple[float, float]) -> Array:
         """Part of each crossing's patch that lies on the strip, (n,): 1 but near edges and clamps.
 
         The patch is the rectangle of the two spacings along the tows about the crossing.
@@ -265,14 +264,14 @@ class BiasStrip:
             )
         return self.width * (2.0 * self.length - 3.0 * self.width) / 2.0, self.width**2
 
-    def pull(self, gamma: Floats) -> Floats:
+    def pull(self, gamma: Array) -> Array:
         """dd/dγ of zone A at 45° [mm], of its angles [rad]."""
         half = gamma / 2.0
-        pull: Floats = (self.length - self.width) / 2.0 * (np.cos(half) - np.sin(half))
+        pull: Array = (self.length - self.width) / 2.0 * (np.cos(half) - np.sin(half))
         return pull
 
 
-def _cut(corners: Floats, inside: Floats) -> Floats:
+def _cut(corners: Array, inside: Array) -> Array:
     """The part of a convex polygon (n, 2) where a linear function, given at its corners, is ≥ 0."""
     kept = []
     for k in range(len(corners)):
@@ -285,7 +284,7 @@ def _cut(corners: Floats, inside: Floats) -> Floats:
     return np.array(kept).reshape(-1, 2)
 
 
-def _area(corners: Floats) -> float:
+def _area(corners: Array) -> float:
     """Of a polygon (n, 2) [mm²]."""
     x, y = corners.T
     return 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))

@@ -7,12 +7,13 @@ nodes and cells nor the direction of a cell in the file matters.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from fabric_fenicsx.fabric.net import WARP, WEFT, Net
+
+from ..arrays import Array, Integers
 
 __all__ = ["CROSSING_TOLERANCE", "net_from_lines", "place"]
 
@@ -29,12 +30,9 @@ NAMES = {WARP: "warp", WEFT: "weft"}
 OWN_AXIS = {WARP: 1, WEFT: 0}
 Z, Y, X = 2, 1, 0
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-
 
 def net_from_lines(
-    points: Floats, warp: Integers, weft: Integers, crossing_gap: float = 0.0
+    points: Array, warp: Integers, weft: Integers, crossing_gap: float = 0.0
 ) -> tuple[Net, Integers]:
     """Build the net of the tows that line cells form.
 
@@ -85,12 +83,12 @@ def net_from_lines(
     return net, source
 
 
-def place(point: Floats) -> str:
+def place(point: Array) -> str:
     """A position as the messages print it."""
     return "({:g}, {:g}, {:g})".format(*(point + 0.0))
 
 
-def _tows(points: Floats, lines: Integers, family: int) -> tuple[Integers, Integers]:
+def _tows(points: Array, lines: Integers, family: int) -> tuple[Integers, Integers]:
     """Nodes along the tows of one family, one tow after another, and the node count of each."""
     group = f"group '{NAMES[family]}'"
     lengths = np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1)
@@ -142,7 +140,7 @@ def _tows(points: Floats, lines: Integers, family: int) -> tuple[Integers, Integ
 
 
 def _warp_left_of_weft(
-    points: Floats, parts: list[tuple[Integers, Integers]]
+    points: Array, parts: list[tuple[Integers, Integers]]
 ) -> list[tuple[Integers, Integers]]:
     """The tows of both families; one that lies across its axis may be turned round."""
     chords = []
@@ -158,14 +156,14 @@ def _warp_left_of_weft(
     return parts
 
 
-def _lean(chords: Floats) -> Floats:
+def _lean(chords: Array) -> Array:
     """How much of the chords' directions lies along each axis, on the mean."""
     lengths = np.linalg.norm(chords, axis=1)
-    lean: Floats = np.round((np.abs(chords) / lengths[:, None]).mean(axis=0), 6)
+    lean: Array = np.round((np.abs(chords) / lengths[:, None]).mean(axis=0), 6)
     return lean
 
 
-def _direction(chords: Floats, own: int) -> Floats:
+def _direction(chords: Array, own: int) -> Array:
     """+1 or -1 for each chord: whether it goes the way of its family."""
     lengths, lean = np.linalg.norm(chords, axis=1), _lean(chords)
     axis = own if lean[own] > CLEAR else int(np.argmax(lean))
@@ -176,14 +174,14 @@ def _direction(chords: Floats, own: int) -> Floats:
     return signs
 
 
-def _by_place(middle: Floats, start: Floats, grain: float, family: int) -> Integers:
+def _by_place(middle: Array, start: Array, grain: float, family: int) -> Integers:
     """Order of the tows: across their family's axis first, then along it, then by height."""
     keys = [1 - OWN_AXIS[family], OWN_AXIS[family], Z]
     coarse = np.round(middle / grain)
     return np.lexsort([table[:, k] for table in (start, middle, coarse) for k in reversed(keys)])
 
 
-def _crossings(points: Floats, cells: Integers, n_warp: int, gap: float) -> Integers:
+def _crossings(points: Array, cells: Integers, n_warp: int, gap: float) -> Integers:
     """Warp node and weft node of each crossing, in the order of the warp nodes."""
     lengths = np.linalg.norm(points[cells[:, 1]] - points[cells[:, 0]], axis=1)
     reach = CROSSING_TOLERANCE * lengths.mean()
@@ -210,8 +208,8 @@ def _crossings(points: Floats, cells: Integers, n_warp: int, gap: float) -> Inte
 
 
 def _sheet_normals(
-    points: Floats, cells: Integers, node_tow: Integers, crossings: Integers
-) -> Floats:
+    points: Array, cells: Integers, node_tow: Integers, crossings: Integers
+) -> Array:
     """Unit normal of the sheet at each cell, perpendicular to it."""
     chords = points[cells[:, 1]] - points[cells[:, 0]]
     lengths = np.linalg.norm(chords, axis=1)
@@ -259,7 +257,7 @@ def _sheet_normals(
     return normals / sizes[:, None]
 
 
-def _upwards(normals: Floats) -> float:
+def _upwards(normals: Array) -> float:
     """+1 or -1: what turns the normals towards +z on the mean, else towards +y, else +x."""
     mean = normals.mean(axis=0)
     for axis in (Z, Y, X):

@@ -6,7 +6,6 @@ All is read off the net's places, so that a mesh of one's own has it too.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import (
     breadth_first_order,
@@ -14,6 +13,7 @@ from scipy.sparse.csgraph import (
     minimum_spanning_tree,
 )
 
+from ..arrays import Array, Integers
 from .net import WARP, WEFT, Net
 
 __all__ = [
@@ -27,9 +27,6 @@ __all__ = [
     "tow_numbers",
     "unit",
 ]
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 
 def tow_numbers(net: Net) -> Integers:
@@ -78,7 +75,7 @@ def crossing_numbers(net: Net) -> tuple[Integers, Integers]:
     return numbers[tow[net.crossings[:, 0]]], numbers[tow[net.crossings[:, 1]]]
 
 
-def reference_angle(net: Net) -> Floats:
+def reference_angle(net: Net) -> Array:
     """In-plane angle of the undeformed crossings beyond 90° [rad], shape (n_crossings,).
 
     γ = atan2(s·t, n·(s × t)) with t warp, s weft and n the sheet's normal, as in
@@ -91,7 +88,7 @@ def reference_angle(net: Net) -> Floats:
     return np.arctan2(np.einsum("ij,ij->i", s, t), np.einsum("ij,ij->i", n, np.cross(s, t)))
 
 
-def areas(net: Net) -> Floats:
+def areas(net: Net) -> Array:
     """Area of the sheet that each crossing stands for [mm²], shape (n_crossings,).
 
     The parallelogram that reaches along both tows half-way to the next crossings, and beyond the
@@ -100,7 +97,7 @@ def areas(net: Net) -> Floats:
     return _reach(net, 0) * _reach(net, 1) * np.cos(reference_angle(net))
 
 
-def _reach(net: Net, side: int) -> Floats:
+def _reach(net: Net, side: int) -> Array:
     """Length [mm] of the warp (0) or weft (1) tow that each crossing stands for."""
     nodes = net.crossings[:, side]
     tow = node_tows(net)
@@ -120,7 +117,7 @@ def _reach(net: Net, side: int) -> Floats:
     return reach
 
 
-def spans(net: Net, side: int) -> Floats:
+def spans(net: Net, side: int) -> Array:
     """What a crossing has of its warp (0) or weft (1) tow either way, (n_crossings, 4) [mm].
 
     Columns: how far its first node and its last node are, and how far its patch reaches towards
@@ -156,13 +153,13 @@ def node_tows(net: Net) -> Integers:
     return tow
 
 
-def at_nodes(net: Net, values: Floats) -> Floats:
+def at_nodes(net: Net, values: Array) -> Array:
     """Unit vectors at the nodes from those of the cells."""
     total = np.zeros((len(net.points), 3))
     np.add.at(total, net.cells.ravel(), np.repeat(values, 2, axis=0))
     return unit(total)
 
 
-def unit(vectors: Floats) -> Floats:
+def unit(vectors: Array) -> Array:
     """Vectors scaled to length one."""
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

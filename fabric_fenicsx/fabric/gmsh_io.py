@@ -24,6 +24,8 @@ from fabric_fenicsx.fabric.chains import net_from_lines, place
 from fabric_fenicsx.fabric.net import WARP, WEFT, Net
 from fabric_fenicsx.fabric.paths import TowPaths, is_straight, straight_lines
 
+from ..arrays import Integers
+
 __all__ = ["GROUPS", "load_gmsh", "mesh_net", "read_msh", "write_msh"]
 
 GROUPS = {"warp": 1, "weft": 1, "tow_ends": 0}
@@ -42,8 +44,6 @@ OPTIONS = {
     "Mesh.MshFileVersion": 4.1,
     "Mesh.SaveAll": 0,
 }
-
-Integers = npt.NDArray[np.int64]
 
 
 def write_msh(fabric: TowPaths, path: str | Path) -> None:

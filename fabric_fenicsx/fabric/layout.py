@@ -12,10 +12,10 @@ from itertools import pairwise
 from math import ceil, cos, degrees, floor, isfinite, radians, sin
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ..arrays import Array
 from .chains import CLEAR
 from .net import WARP, WEFT
 from .outline import Outline
@@ -29,8 +29,6 @@ SHORTEST_END = 0.1
 
 FLATTEST = 15.0
 """Smallest angle between warp and weft [degrees]."""
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +118,7 @@ class TowLayout:
         return self.warp if family == WARP else self.weft
 
     @property
-    def directions(self) -> tuple[Floats, Floats]:
+    def directions(self) -> tuple[Array, Array]:
         """Unit vectors of the tows of WARP and of WEFT, each of shape (2,)."""
         return _directions(self.warp.angle, self.weft.angle)
 
@@ -134,7 +132,7 @@ class TowLayout:
         number = _numbers(pieces)
         direction = self.directions[family]
         side = _across(family, direction)
-        met: dict[int, list[tuple[float, Floats, float]]] = {}
+        met: dict[int, list[tuple[float, Array, float]]] = {}
         for (warp, weft), at in crossings.items():
             over = self.pattern.over(number[warp], number[weft])
             height = self.crimp / 2.0 if bool(over) == (family == WARP) else -self.crimp / 2.0
@@ -147,7 +145,7 @@ class TowLayout:
         ]
 
     def _path(
-        self, piece: _Piece, direction: Floats, side: Floats, met: list[tuple[float, Floats, float]]
+        self, piece: _Piece, direction: Array, side: Array, met: list[tuple[float, Array, float]]
     ) -> TowPath:
         """One tow through its crossings, each given by its place along the tow, point, height."""
         position = self.family(piece.family).positions[piece.line]
@@ -179,7 +177,7 @@ class TowLayout:
         t, s = self.directions
         return float(np.ptp(positions) / (len(positions) - 1) / abs(t @ _across(WEFT, s)))
 
-    def _connected(self) -> tuple[list[_Piece], dict[tuple[int, int], Floats]]:
+    def _connected(self) -> tuple[list[_Piece], dict[tuple[int, int], Array]]:
         """The pieces that hang together, and where two of them, a warp and a weft one, cross."""
         pieces = [piece for family in (WARP, WEFT) for piece in self._cut(family)]
         crossings = self._crossings(pieces)
@@ -213,7 +211,7 @@ class TowLayout:
                     pieces.append(piece)
         return pieces
 
-    def _crossings(self, pieces: Sequence[_Piece]) -> dict[tuple[int, int], Floats]:
+    def _crossings(self, pieces: Sequence[_Piece]) -> dict[tuple[int, int], Array]:
         """Where warp pieces cross weft pieces [mm], by their places in the list."""
         t, s = self.directions
         a, b = _across(WARP, t), _across(WEFT, s)
@@ -263,7 +261,7 @@ class TowLayout:
                         raise ValueError("tows: a quarter needs an outline symmetric about x and y")
 
 
-def _directions(warp_angle: float, weft_angle: float) -> tuple[Floats, Floats]:
+def _directions(warp_angle: float, weft_angle: float) -> tuple[Array, Array]:
     """Unit vectors of the tows of WARP and of WEFT at angles [degrees], each of shape (2,).
 
     A warp tow points towards +y and a weft tow towards +x, however its angle is given. One that
@@ -286,7 +284,7 @@ def _directions(warp_angle: float, weft_angle: float) -> tuple[Floats, Floats]:
     return t + 0.0, s + 0.0
 
 
-def _across(family: int, direction: Floats) -> Floats:
+def _across(family: int, direction: Array) -> Array:
     """Unit vector to the right of a warp tow, to the left of a weft tow, shape (2,)."""
     x, y = direction
     return np.array([y, -x] if family == WARP else [-y, x]) + 0.0
@@ -350,14 +348,14 @@ def spaced_layout(
     return TowLayout(warp, weft, outline, subdivisions, quarter, crimp, pattern)
 
 
-def _level_at_both_ends(a: Floats, b: Floats) -> Floats:
+def _level_at_both_ends(a: Array, b: Array) -> Array:
     """Inner control points of the Bézier curve from a to b: z goes as 3u² − 2u³ over the chord."""
     inner = np.array([2.0 * a + b, a + 2.0 * b]) / 3.0
     inner[:, 2] = a[2], b[2]
     return inner
 
 
-def _positions(gaps: Floats, low: float, high: float) -> list[float]:
+def _positions(gaps: Array, low: float, high: float) -> list[float]:
     """Tows whose half gaps on both sides lie within the range; gap 0 is about the origin."""
     n, period = len(gaps), float(gaps.sum())
     first = gaps[0] / 2.0 + np.append(0.0, np.cumsum(gaps[1:]))

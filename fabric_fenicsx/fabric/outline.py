@@ -12,23 +12,21 @@ from math import isfinite, sqrt
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from .paths import ROUNDING
 
 __all__ = ["Circle", "Outline", "Polygon", "rectangle"]
-
-Floats = npt.NDArray[np.float64]
 
 
 class Outline(Protocol):
     """What a layout asks of an outline; points and directions are of the plane, shape (2,)."""
 
-    def chords(self, point: Floats, direction: Floats) -> list[tuple[float, float]]:
+    def chords(self, point: Array, direction: Array) -> list[tuple[float, float]]:
         """Where the line point + s direction (a unit vector) lies inside: from s to s, in order."""
         ...
 
-    def extent(self, direction: Floats) -> tuple[float, float]:
+    def extent(self, direction: Array) -> tuple[float, float]:
         """Smallest and largest component of the outline's points along a unit vector [mm]."""
         ...
 
@@ -44,7 +42,7 @@ class Circle:
         if not (isfinite(self.radius) and self.radius > 0.0):
             raise ValueError(f"outline: radius is {self.radius}; a length above 0 mm is needed")
 
-    def chords(self, point: Floats, direction: Floats) -> list[tuple[float, float]]:
+    def chords(self, point: Array, direction: Array) -> list[tuple[float, float]]:
         """At most one chord."""
         away = np.asarray(point) - self.centre
         middle = -float(away @ direction)
@@ -53,7 +51,7 @@ class Circle:
             return []
         return [(middle - sqrt(square), middle + sqrt(square))]
 
-    def extent(self, direction: Floats) -> tuple[float, float]:
+    def extent(self, direction: Array) -> tuple[float, float]:
         """The diameter's ends."""
         middle = float(np.asarray(self.centre) @ direction)
         return middle - self.radius, middle + self.radius
@@ -81,7 +79,7 @@ class Polygon:
             raise ValueError(f"outline: the point ({x:g}, {y:g}) stands there twice")
         _refuse_crossed_sides(at)
 
-    def chords(self, point: Floats, direction: Floats) -> list[tuple[float, float]]:
+    def chords(self, point: Array, direction: Array) -> list[tuple[float, float]]:
         """One chord for each stretch of the line inside the polygon or on its edge."""
         begin = np.array(self.points)
         end = np.roll(begin, -1, axis=0)
@@ -108,7 +106,7 @@ class Polygon:
             chords.append((float(low), float(high)))
         return chords
 
-    def extent(self, direction: Floats) -> tuple[float, float]:
+    def extent(self, direction: Array) -> tuple[float, float]:
         """Of the corners."""
         along = np.array(self.points) @ direction
         return float(along.min()), float(along.max())
@@ -120,7 +118,7 @@ def rectangle(x_range: Sequence[float], y_range: Sequence[float]) -> Polygon:
     return Polygon(((left, bottom), (right, bottom), (right, top), (left, top)))
 
 
-def _holds(begin: Floats, end: Floats, at: Floats, tolerance: float) -> bool:
+def _holds(begin: Array, end: Array, at: Array, tolerance: float) -> bool:
     """Whether a point lies within the sides or on one of them."""
     side = end - begin
     length = np.einsum("ij,ij->i", side, side)
@@ -134,11 +132,11 @@ def _holds(begin: Floats, end: Floats, at: Floats, tolerance: float) -> bool:
     return bool(np.count_nonzero(spans & meets) % 2)
 
 
-def _refuse_crossed_sides(at: Floats) -> None:
+def _refuse_crossed_sides(at: Array) -> None:
     n = len(at)
     end = np.roll(at, -1, axis=0)
 
-    def turn(a: Floats, b: Floats, c: Floats) -> float:
+    def turn(a: Array, b: Array, c: Array) -> float:
         return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
     for k in range(n):

@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Integers
 from .axes import REACH
 from .crossings import node_tows, tow_numbers
 from .net import Net, Where
 
 __all__ = ["Part", "parts"]
-
-Integers = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

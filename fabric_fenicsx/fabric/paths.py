@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array, Integers
 from .net import WARP, WEFT
 
 __all__ = [
@@ -28,9 +29,6 @@ ROUNDING = 1e-9
 MOST_CELLS = 4_000_000
 """Of a net: beyond it a length is rather in the wrong unit than meant."""
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TowPath:
@@ -46,9 +44,9 @@ class TowPath:
         ValueError: the numbers of stations, cells and controls contradict each other.
     """
 
-    stations: Floats
+    stations: Array
     cells: Sequence[int]
-    controls: Sequence[Floats | None] = ()
+    controls: Sequence[Array | None] = ()
 
     def __post_init__(self) -> None:
         n = len(self.stations)
@@ -59,7 +57,7 @@ class TowPath:
             if count != n - 1 and not (name == "controls" and count == 0):
                 raise ValueError(f"tow: {count} {name} for {n - 1} pieces")
 
-    def pieces(self) -> list[tuple[int, Floats | None]]:
+    def pieces(self) -> list[tuple[int, Array | None]]:
         """Number of cells and control points of each piece."""
         controls = self.controls or [None] * len(self.cells)
         return list(zip((int(n) for n in self.cells), controls, strict=True))
@@ -87,7 +85,7 @@ def is_straight(fabric: TowPaths) -> bool:
     )
 
 
-def straight_lines(fabric: TowPaths) -> tuple[Floats, Integers, Integers]:
+def straight_lines(fabric: TowPaths) -> tuple[Array, Integers, Integers]:
     """Nodes and cells of straight tows, where gmsh puts them: pieces divided evenly.
 
     Returns:
@@ -96,7 +94,7 @@ def straight_lines(fabric: TowPaths) -> tuple[Floats, Integers, Integers]:
     Raises:
         ValueError: there is no such fabric.
     """
-    points: list[Floats] = []
+    points: list[Array] = []
     lines: list[Integers] = []
     count = 0
     for family in (WARP, WEFT):
@@ -116,7 +114,7 @@ def straight_lines(fabric: TowPaths) -> tuple[Floats, Integers, Integers]:
 
 
 def divide(
-    stations: Floats, crossings: Floats, spacing: float, subdivisions: int
+    stations: Array, crossings: Array, spacing: float, subdivisions: int
 ) -> npt.NDArray[np.int64]:
     """Cells in each piece of a tow: a fixed number between crossings, as fine beyond them.
 

@@ -7,14 +7,12 @@ tows, so that the faces reach as far as tows do. The corners of a sheet beyond b
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Integers
 from .crossings import node_tows
 from .net import Net
 
 __all__ = ["meshes", "next_crossings", "rim_faces"]
-
-Integers = npt.NDArray[np.int64]
 
 
 def next_crossings(net: Net) -> tuple[Integers, Integers]:

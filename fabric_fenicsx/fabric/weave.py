@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array, Integers
 from ..errors import InputError
 
 __all__ = [
@@ -46,8 +47,6 @@ __all__ = [
 ]
 
 Rows = tuple[tuple[int, ...], ...]
-Integers = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
 
 UP, DOWN = "1x#", "0.-"
 """Characters of a drawn pattern: warp on top, weft on top."""
@@ -146,7 +145,7 @@ class WeavePattern:
         return np.array(self.stitches) if self.stitches else np.zeros_like(self.matrix)
 
     @property
-    def _weights(self) -> Floats:
+    def _weights(self) -> Array:
         changes = np.zeros(self.matrix.shape)
         for axis in (0, 1):
             after = self._changes(axis)

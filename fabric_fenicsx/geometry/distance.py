@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy import ndimage
 
+from ..arrays import Array
 from .triangles import Triangles
 
 __all__ = ["DistanceGrid", "cubic_basis", "exact_distance"]
 
-Array = npt.NDArray[np.float64]
 
 #: Grid layers around the box in which the spline is evaluated; it reaches one further.
 BORDER = 2

@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
+
+from ..arrays import Array
 
 __all__ = ["FormedHemisphere", "FormedSurface", "Moved"]
-
-Array = npt.NDArray[np.float64]
 
 
 class FormedSurface(Protocol):

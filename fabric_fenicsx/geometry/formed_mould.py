@@ -16,12 +16,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import map_coordinates, spline_filter
 
+from ..arrays import Array
 from .distance import cubic_basis
 from .triangles import Triangles
 
 __all__ = ["FormedMould", "round_die"]
 
-Array = npt.NDArray[np.float64]
 
 #: Raster lines on either side of the axis, and half planes in which spans are looked for.
 LINES, PLANES = 200, 720

@@ -20,11 +20,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import RegularGridInterpolator
 
+from ..arrays import Array
 from .formed import FormedSurface
 
 __all__ = ["KinematicNet", "net_on_surface"]
 
-Array = npt.NDArray[np.float64]
 
 #: Smallest angle between the tows of a mesh [rad]; below it they lie side by side.
 CLOSED = np.radians(1.0)

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 
 __all__ = ["Triangles", "read_stl", "write_stl"]
 
-Array = npt.NDArray[np.float64]
 
 #: One triangle of a binary STL: normal, three corners, two bytes of no meaning.
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])

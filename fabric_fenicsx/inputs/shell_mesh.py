@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+
+from ..arrays import Array, Integers
 
 if TYPE_CHECKING:
     from .deck import Deck
 
 __all__ = ["NAMES", "ShellMesh", "padded"]
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 CORNERS = {3: 3, 4: 4, 6: 3, 8: 4}
 """Corners of an element by its number of nodes; those amid its sides follow them."""

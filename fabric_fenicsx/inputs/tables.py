@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 from .keys import one_of, plain
 from .validation import one_line, read_text, suggestion
 
 __all__ = ["Column", "read_table"]
 
-Array = npt.NDArray[np.float64]
 
 LARGEST = 1e12
 """Of a reading in N, mm, s or degrees: sums of squares of such are still numbers."""

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import yaml
 from scipy.linalg import block_diag
 
+from ..arrays import Array
 from ..errors import InputError
 from ..mechanics.bending_laws import BENDING_LAWS, BendingLaw
 from ..mechanics.laws import LAWS
@@ -43,7 +43,6 @@ __all__ = [
     "write_fabric",
 ]
 
-Array = npt.NDArray[np.float64]
 
 BASELINE = {
     "k1_N": "crossover.k1_N_mm",

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 from ..inputs.keys import one_of
 from ..inputs.validation import suggestion
@@ -29,8 +29,6 @@ from .measurement.schema import SCHEMA
 from .own_effects import of_test
 
 __all__ = ["Hidden", "Synthetic", "parse_effect", "synthesise", "write_measurement"]
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

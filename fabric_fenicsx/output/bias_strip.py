@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from scipy.interpolate import LinearNDInterpolator
@@ -18,9 +17,9 @@ from fabric_fenicsx.output.files import replacing
 from fabric_fenicsx.output.lines import COLOURS, scale_limits, tow_lines
 from fabric_fenicsx.solving.snapshot import Snapshot, at_rest
 
-__all__ = ["draw_curve", "draw_strip"]
+from ..arrays import Array
 
-Array = npt.NDArray[np.float64]
+__all__ = ["draw_curve", "draw_strip"]
 
 
 def draw_strip(path: Path, net: Net, snapshot: Snapshot, strip: BiasStrip) -> None:

@@ -11,7 +11,6 @@ from typing import Any
 from zlib import Z_RLE
 
 import numpy as np
-import numpy.typing as npt
 import vtkmodules.vtkRenderingFreeType
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401, both make what the classes below stand for
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
@@ -31,13 +30,13 @@ from vtkmodules.vtkRenderingCore import (
 )
 from vtkmodules.vtkRenderingOpenGL2 import vtkRenderStepsPass
 
+from ..arrays import Array
 from ..errors import InputError
 from .colours import rgb
 from .files import replacing
 
 __all__ = ["Canvas", "canvas"]
 
-Array = npt.NDArray[np.float64]
 
 FINER = 2
 """Pixels of the scene for one of the picture, in either direction."""

@@ -6,11 +6,11 @@ Matplotlib is asked only for those that are rarely needed: its import takes long
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
+
+from ..arrays import Array
 
 __all__ = ["colour_table", "rgb"]
 
-Array = npt.NDArray[np.float64]
 
 SHADES = 256
 

@@ -15,9 +15,10 @@ import numpy.typing as npt
 from fabric_fenicsx.output.draped import DrapedSheet
 from fabric_fenicsx.output.pattern import to_line
 
+from ..arrays import Array
+
 __all__ = ["AngleMap", "compared_angles", "differing_keys", "line_distance", "repeat_scatter"]
 
-Array = npt.NDArray[np.float64]
 
 #: Places of repeated measurements closer than this are the same [mm].
 SAME_PLACE = 1e-3

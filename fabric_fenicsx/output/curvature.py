@@ -11,13 +11,12 @@ Composites A 143 (2021) 106308.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.output.draped import DrapedSheet
 
-__all__ = ["excess_curvature", "principal_curvatures", "shape_operators"]
+from ..arrays import Array
 
-Array = npt.NDArray[np.float64]
+__all__ = ["excess_curvature", "principal_curvatures", "shape_operators"]
 
 
 def shape_operators(sheet: DrapedSheet, places: Array | None = None) -> Array:

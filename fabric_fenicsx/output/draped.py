@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from fabric_fenicsx.fabric.axes import tow_axes
@@ -19,11 +18,10 @@ from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.fabric.quads import meshes, next_crossings, rim_faces
 from fabric_fenicsx.solving.snapshot import Snapshot
 
+from ..arrays import Array, Flags, Integers
+
 __all__ = ["DrapedSheet", "Found", "draped_sheet", "locate"]
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Flags = npt.NDArray[np.bool_]
 
 #: Faces tried for a point: those with the nearest middles.
 TRIED = 16

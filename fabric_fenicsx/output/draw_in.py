@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.output.draped import DrapedSheet
 
-__all__ = ["DrawIn", "draw_in"]
+from ..arrays import Array
 
-Array = npt.NDArray[np.float64]
+__all__ = ["DrawIn", "draw_in"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 import pyvista as pv
 
@@ -25,10 +24,9 @@ from fabric_fenicsx.output.files import write_text
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
 from fabric_fenicsx.solving.snapshot import Snapshot
 
-__all__ = ["FibreMap", "fibre_map", "nearest_tool"]
+from ..arrays import Array, Integers
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+__all__ = ["FibreMap", "fibre_map", "nearest_tool"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

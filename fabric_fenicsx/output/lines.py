@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.solving.snapshot import Snapshot
+
+from ..arrays import Array
 
 __all__ = [
     "COLOURS",
@@ -21,8 +22,6 @@ __all__ = [
     "tow_lines",
     "tow_spacing",
 ]
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

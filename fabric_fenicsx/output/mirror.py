@@ -10,10 +10,10 @@ import numpy.typing as npt
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.solving.snapshot import Snapshot
 
+from ..arrays import Array, Integers
+
 __all__ = ["whole_sheet"]
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 TOLERANCE = 1e-6
 """Of the shortest cell: how near to a plane a node lies in it."""

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from scipy.spatial import ConvexHull
 
 from fabric_fenicsx.output.draped import DrapedSheet
 from fabric_fenicsx.output.files import write_text
+
+from ..arrays import Array
 
 __all__ = [
     "FlatPattern",
@@ -27,7 +28,6 @@ __all__ = [
     "write_pattern",
 ]
 
-Array = npt.NDArray[np.float64]
 
 #: Largest distance of points along a trim line before it is carried back [mm].
 STEP = 2.0

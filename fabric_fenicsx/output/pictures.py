@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkFeatureEdges, vtkPolyDataNormals, vtkTubeFilter
@@ -30,9 +29,9 @@ from fabric_fenicsx.output.polydata import poly_data
 from fabric_fenicsx.output.surfaces import RevolvedSurface, TriangleSurface, triangles
 from fabric_fenicsx.solving.snapshot import Snapshot
 
-__all__ = ["VIEWS", "draw_net"]
+from ..arrays import Array
 
-Array = npt.NDArray[np.float64]
+__all__ = ["VIEWS", "draw_net"]
 
 
 # From the picture to the eye, and what points upwards.

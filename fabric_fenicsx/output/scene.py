@@ -27,7 +27,6 @@ from fabric_fenicsx.solving.snapshot import Snapshot
 
 __all__ = ["SHOWN", "write_scene"]
 
-Array = npt.NDArray[np.float64]
 
 SHOWN = ("shear_angle", "axial_force", "contact_pressure", "bending_out_of_plane", "displacement")
 """Keys of COLOURS that a scene offers."""

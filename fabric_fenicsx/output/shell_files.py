@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 import pyvista as pv
 
@@ -18,9 +17,10 @@ from fabric_fenicsx.inputs.deck import Deck, rows
 from fabric_fenicsx.inputs.shell_mesh import NAMES, ShellMesh
 from fabric_fenicsx.output.shells import ShellFibres
 
+from ..arrays import Array
+
 __all__ = ["LAYUPS", "Ply", "abaqus", "calculix", "drape", "grid", "plies", "table"]
 
-Array = npt.NDArray[np.float64]
 
 LAYUPS = ("warp-weft", "symmetric", "warp", "bisector")
 """What a fabric is written as; `symmetric` has half of the warp on either side of the weft."""

@@ -26,10 +26,10 @@ from fabric_fenicsx.fabric.net import WARP, Net
 from fabric_fenicsx.inputs.shell_mesh import ShellMesh
 from fabric_fenicsx.output.fibres import FibreMap
 
+from ..arrays import Array, Integers
+
 __all__ = ["Placement", "ShellFibres", "flat_fraction", "on_shells", "warp_share"]
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 Booleans = npt.NDArray[np.bool_]
 
 SIDES = {"both": 0.0, "front": 1.0, "back": -1.0}

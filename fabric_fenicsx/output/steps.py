@@ -19,10 +19,11 @@ import numpy.typing as npt
 from fabric_fenicsx.fabric.net import Where
 from fabric_fenicsx.output.files import write_npz
 
+from ..arrays import Integers
+
 __all__ = ["StepFile", "remove_step", "remove_torn", "step_path", "write_step"]
 
 Array = npt.NDArray[Any]
-Integers = npt.NDArray[np.int64]
 
 
 def step_path(steps: Path, number: int) -> Path:

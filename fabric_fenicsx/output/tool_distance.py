@@ -12,10 +12,10 @@ import pyvista as pv
 
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
 
+from ..arrays import Array, Integers
+
 __all__ = ["ToolDistance", "deepest_penetration", "tool_distance"]
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 HOLDING = "holder"
 """What the name of a tool begins with that presses the fabric on another and gives it no shape."""

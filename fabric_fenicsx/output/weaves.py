@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pyvista as pv
 from scipy.interpolate import CubicHermiteSpline
 
@@ -13,9 +12,10 @@ from fabric_fenicsx.fabric.net import WARP, Net
 from fabric_fenicsx.output.canvas import Canvas, canvas
 from fabric_fenicsx.output.colours import rgb
 
+from ..arrays import Array
+
 __all__ = ["draw_weave"]
 
-Array = npt.NDArray[np.float64]
 
 COLOURS = ("#2f5d8a", "#d9a441")
 """Of warp and weft."""

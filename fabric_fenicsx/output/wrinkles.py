@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.draped import DrapedSheet
@@ -21,10 +20,9 @@ from fabric_fenicsx.output.lines import arc_length
 from fabric_fenicsx.output.tool_distance import ToolDistance
 from fabric_fenicsx.solving.snapshot import Snapshot
 
-__all__ = ["Wave", "buckling_ratio", "in_plane_waves", "tow_waves", "turning_points", "waves"]
+from ..arrays import Array, Integers
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+__all__ = ["Wave", "buckling_ratio", "in_plane_waves", "tow_waves", "turning_points", "waves"]
 
 
 @dataclass(frozen=True, slots=True)

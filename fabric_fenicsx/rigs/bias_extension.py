@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, field_validator, model_validator
 
+from ..arrays import Array, Integers
 from ..errors import InputError
 from ..fabric.bias_strip import BiasStrip
 from ..fabric.layout import SHORTEST_END
@@ -42,8 +42,6 @@ __all__ = [
     "waist",
 ]
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: Share by which the limit of slip rises where a crossing slips as fast as the crosshead goes.
 SLIP_DRAG = 0.02

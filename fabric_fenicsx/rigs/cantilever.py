@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
+from ..arrays import Array
 from ..fabric.net import WEFT, Net
 from ..fabric.paths import TowPaths
 from ..fabric.sheet import Sheet
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from .simulation import Run
 
 __all__ = ["RIG", "CantileverCase", "build", "midline", "run", "strip"]
-
-Array = npt.NDArray[np.float64]
 
 
 class CantileverCase(PlainWeaveCase):

@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
+from ..arrays import Array
 from ..errors import InputError
 from ..fabric.axes import axes_shear, shear_at
 from ..fabric.net import Net
@@ -58,8 +59,6 @@ COMBINATION = (
     "the spacing is refined, since cells shrink with it"
 )
 
-Floats = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
@@ -75,8 +74,8 @@ class Outcome:
     """
 
     net: Net
-    flat: Floats
-    shear: Floats
+    flat: Array
+    shear: Array
     region: npt.NDArray[np.str_]
     numbers: dict[str, float]
     estimate: float

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..fabric.axes import axes_shear, shear_at
 from ..fabric.net import Net
 from ..parallel import from_root, neighbour
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from ..solving.snapshot import Snapshot
 
 __all__ = ["report"]
-
-Array = npt.NDArray[np.float64]
 
 
 def report(case: DrapeCase, session: Session, model: Model, outcome: Run) -> dict[str, Any]:

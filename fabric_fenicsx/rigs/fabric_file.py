@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, ValidationError, model_validator
 
+from ..arrays import Array
 from ..errors import InputError
 from ..inputs.groups import Keys, NotNegative, Positive
 from ..inputs.validation import mistakes, one_line, read_keys
@@ -33,7 +33,6 @@ __all__ = [
     "with_fabric",
 ]
 
-Array = npt.NDArray[np.float64]
 AnyCase = TypeVar("AnyCase", bound=Case)
 
 SCHEMA = "fabric/1"

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import Delaunay, QhullError
 
+from ..arrays import Array
 from ..fabric.crossings import crossings_by_tow
 from ..fabric.net import WARP, Net
 from ..mechanics.contact import LIMIT
@@ -21,7 +22,6 @@ from ..solving.snapshot import Snapshot
 
 __all__ = ["drape_health", "pointless"]
 
-Array = npt.NDArray[np.float64]
 Gaps = Mapping[str, Array]
 Rows = Sequence[dict[str, float]]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 from ..fabric.net import WARP, WEFT
 from ..fabric.outline import Outline, rectangle
@@ -23,7 +23,6 @@ from .drape import DrapeCase, flat_sheet
 
 __all__ = ["formed_surface", "kinematic_net", "known_angles", "quantities"]
 
-Array = npt.NDArray[np.float64]
 
 FINE, COARSE = 1.0 / 40.0, 1.0 / 4.0
 """Spacing of a net unless told, and the widest allowed, as shares of the hole's radius: 2 mm on the

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from ..arrays import Array
 from ..fabric.net import Net
 from ..fabric.paths import TowPaths
 from ..fabric.sheet import Sheet
@@ -38,8 +38,6 @@ __all__ = [
     "run",
     "woven_sheet",
 ]
-
-Array = npt.NDArray[np.float64]
 
 
 class PictureFrameCase(CrossheadCase):

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 import yaml
 
+from ..arrays import Array
 from ..errors import InputError
 from ..inputs.keys import one_of
 from ..inputs.tables import Column, read_table
@@ -29,7 +29,6 @@ from .load import load_case
 
 __all__ = ["report", "wrinkles"]
 
-Array = npt.NDArray[np.float64]
 
 PLACE = (Column("x_mm"), Column("y_mm"), Column("z_mm", optional=True))
 ANGLES = (

@@ -24,8 +24,8 @@ from typing import Any
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 from ..output.files import write_text
 from ..parallel import from_root
@@ -36,7 +36,6 @@ from .registry import rig
 
 __all__ = ["Spread", "ensemble", "spread", "uncertain"]
 
-Array = npt.NDArray[np.float64]
 Runner = Callable[[Case, Path, Callable[[float, int, int], None]], dict[str, Any]]
 
 #: Steps along an axis in the order in which they are tried.

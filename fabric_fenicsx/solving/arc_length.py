@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from petsc4py import PETSc
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import SolveError
 from .discretisation import BLOCK
 from .model import Model
@@ -28,7 +28,6 @@ from .update import advance_fields
 
 __all__ = ["ArcLength", "Point"]
 
-Array = npt.NDArray[np.float64]
 
 #: Iterations that a step should take: longer steps after easier ones, as the square root of both.
 AIM = 5

@@ -18,15 +18,13 @@ nothing.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from .model import Model
 from .momentum import Momentum
 from .stepping import Step
 
 __all__ = ["Balance"]
-
-Array = npt.NDArray[np.float64]
 
 
 class Balance:

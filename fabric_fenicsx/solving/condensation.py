@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array, Integers
 from ..fabric.net import Net
 from .blocks import BLOCK
 from .discretisation import Discretisation
 
 __all__ = ["Blocks", "Elimination", "Runs", "inner_nodes"]
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: By how much an entry may grow while a chain is eliminated, relative to the diagonal's in its row
 #: and column, of which the geometric mean counts: so many digits may be lost (Demmel, Higham &

@@ -9,11 +9,11 @@ from typing import Any
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
 from ufl import as_vector, derivative, max_value
 
 from .. import _dolfinx
 from .._dolfinx import Function
+from ..arrays import Array
 from ..mechanics import beam, contact
 from ..mechanics.terms import Term, energy_term, symmetric_part, work_term
 from ..mechanics.tools import SampledTool, Tool
@@ -23,7 +23,6 @@ from .pressed import PressedTool
 
 __all__ = ["ContactLaw", "Contacts"]
 
-Array = npt.NDArray[np.float64]
 
 #: Coefficients up to which, and nodes of a net from which on, Newton has the symmetric part of
 #: friction's tangent, which is factorised at less than half the cost. What is left out comes from

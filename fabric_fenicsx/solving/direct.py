@@ -11,11 +11,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
-import numpy.typing as npt
+
+from ..arrays import Array
 
 __all__ = ["blas", "destroy", "fail", "give_back", "ordering", "petsc", "solved", "solver"]
 
-Array = npt.NDArray[np.float64]
 
 #: PC_FACTOR_OTHER of PETSc's petscpctypes.h, which not all versions of petsc4py have a name for.
 FACTOR_OTHER = 4

@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from .. import _dolfinx
 from .._dolfinx import Function
+from ..arrays import Array
 from ..fabric.crossings import at_nodes, reference_angle, unit
 from ..fabric.net import Net, Where
 from ..fabric.part import Part
@@ -38,8 +39,6 @@ MANY_OFTEN, MANY = 560, 4000
 
 #: PETSc's own copy of each communicator that nets are on, by its handle.
 _COPIES: dict[int, PETSc.Comm] = {}
-
-Array = npt.NDArray[np.float64]
 
 
 def _keep_copy(comm: MPI.Comm) -> None:

@@ -10,10 +10,9 @@ from petsc4py import PETSc
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Copies", "Gather", "Table"]
+from ..arrays import Array, Integers
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+__all__ = ["Copies", "Gather", "Table"]
 
 
 class Copies:

@@ -13,13 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
+from ..arrays import Array
 from ..fabric.net import Where
 from ..mechanics import beam, crossover
 from .discretisation import Discretisation
 
 __all__ = ["Histories"]
-
-Array = npt.NDArray[np.float64]
 
 
 class Histories:

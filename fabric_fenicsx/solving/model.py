@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
+from ..arrays import Array
 from ..fabric.net import Net
 from ..fabric.part import Part
 from ..fabric.section import Section
@@ -36,7 +37,6 @@ from .system import System
 
 __all__ = ["Model", "Support"]
 
-Array = npt.NDArray[np.float64]
 
 #: Linear rate of Newton's convergence up to which half the cost of a factorisation is worth it.
 NEGLIGIBLE_RATE = 0.01

@@ -9,15 +9,13 @@ crossings act within and cancel, as their energies do not know a rigid motion.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from .discretisation import BLOCK
 from .model import Model
 from .update import rotate
 
 __all__ = ["Momentum"]
-
-Array = npt.NDArray[np.float64]
 
 
 class Momentum:

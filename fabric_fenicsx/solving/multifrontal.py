@@ -10,16 +10,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array, Integers
 from .blocks import BLOCK
 from .direct import blas
 from .ordering import nested_dissection
 
 __all__ = ["Fronts", "blas_known"]
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: What multifrontal.c takes of BLAS and LAPACK, in the order of its arguments.
 FACTORISING = ("dsyrk", "dtrsm")

@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Integers
+
 __all__ = ["nested_dissection"]
 
-Integers = npt.NDArray[np.int64]
 
 #: Parts of so many nodes are not cut further.
 SMALL = 6

@@ -16,13 +16,13 @@ import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ..arrays import Integers
 from ..fabric.net import Net, Where
 from ..fabric.part import Part, parts
 from .exchange import Gather
 
 __all__ = ["handed_out", "partition", "put_together"]
 
-Integers = npt.NDArray[np.int64]
 
 #: Of the net's extent: places closer than this are the same.
 SAME = 1e-6

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from ufl import variable
 
 from .. import _dolfinx
 from .._dolfinx import Function
+from ..arrays import Array
 from ..fabric.crossings import spans
 from ..mechanics import crossover, slip
 from ..mechanics.laws.dashpots import LinearDashpot
@@ -23,8 +23,6 @@ from .generalised_alpha import backward_difference
 from .history import Histories
 
 __all__ = ["Crossings", "CrossoverLaw"]
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

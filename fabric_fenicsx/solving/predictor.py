@@ -13,11 +13,11 @@ import math
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
+
+from ..arrays import Array
 
 __all__ = ["DEPTH", "Predictor"]
 
-Array = npt.NDArray[np.float64]
 
 #: Past steps that are kept.
 DEPTH = 4

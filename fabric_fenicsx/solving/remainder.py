@@ -20,7 +20,6 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import (
     LinAlgError,
     LinAlgWarning,
@@ -31,6 +30,7 @@ from scipy.linalg import (
 )
 
 from .. import _dolfinx
+from ..arrays import Array, Integers
 from .blocks import BLOCK, block_matrix, expand
 from .direct import destroy, give_back, ordering, solved, solver
 from .multifrontal import Fronts, blas_known
@@ -38,8 +38,6 @@ from .ordering import nested_dissection
 
 __all__ = ["ByFronts", "ByMumps", "Left"]
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 #: Unknowns of the ranks' edges up to which these are solved for as a dense matrix, on every rank.
 DENSE = 3000

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..fabric.axes import TowAxes, axes_shear
 from ..fabric.net import Where
 from .exchange import Copies, Gather
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["PLACES", "Seen"]
 
-Array = npt.NDArray[np.float64]
 
 PLACES: dict[str, Where] = {
     "displacement": "nodes",

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
 
 from .._dolfinx import Function
+from ..arrays import Array
 from ..errors import SolveError
 from .blocks import BLOCK
 from .generalised_alpha import GeneralisedAlpha
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from .model import Model
 
 __all__ = ["State", "Step", "StepControl", "Stepper"]
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(slots=True)

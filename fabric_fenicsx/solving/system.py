@@ -14,13 +14,13 @@ import numpy.typing as npt
 
 from .. import _dolfinx
 from .._dolfinx import Function
+from ..arrays import Array
 from ..mechanics.beam import SectionLaw, linear_section, linearised_forces
 from ..mechanics.terms import Term, side_by_side, total
 from .discretisation import BLOCK, Discretisation
 
 __all__ = ["System"]
 
-Array = npt.NDArray[np.float64]
 
 MESHES = ("tows", "crossovers")
 

@@ -32,7 +32,6 @@ from .system import System
 
 __all__ = ["Condensed", "OfComponents", "Tangent", "Whole", "tangent_of"]
 
-Array = npt.NDArray[np.float64]
 
 #: Nodes between crossings from which on eliminating them pays.
 LEAST = 100

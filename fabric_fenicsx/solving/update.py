@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+
+from ..arrays import Array
 
 __all__ = ["advance", "advance_fields", "cayley", "compose", "rotate"]
-
-Array = npt.NDArray[np.float64]
 
 
 def cayley(theta: Array) -> Array:

@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
+
+from ...arrays import Array
 
 __all__ = [
     "MARKS",
@@ -19,7 +20,6 @@ __all__ = [
     "numbers",
 ]
 
-Array = npt.NDArray[np.float64]
 
 MARKS = {".": ",", ",": "."}
 """Marks of decimals, each with the mark that then may group thousands."""

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...arrays import Array
 from ...mechanics.scalars import Steps
 
 __all__ = ["march"]
 
-Array = npt.NDArray[np.float64]
 
 WRITTEN: dict[str, str] = {
     "Sum": "{} + {}",

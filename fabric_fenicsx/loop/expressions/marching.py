@@ -16,8 +16,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Integers
 from ...mechanics.chain_rule import differentiated
 from ...mechanics.scalars import evaluated, lowered, parted, steps_of, symbol
 from ..kept import Kept
@@ -25,12 +25,10 @@ from .compiled import march
 
 __all__ = ["MOST_KEPT", "ONE_RECORD", "Marched", "Varying", "spread"]
 
-Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
 
 MOST_KEPT = 64
 """Of so many expressions is kept what does not change: of all, memory would grow."""
-ONE_RECORD: Numbers = np.zeros(1, dtype=np.int64)
+ONE_RECORD: Integers = np.zeros(1, dtype=np.int64)
 """Where a single record begins."""
 
 
@@ -94,7 +92,7 @@ class Marched:
         inputs: Mapping[str, Varying],
         values: Mapping[str, float | Array],
         first: Mapping[str, Array] = MappingProxyType({}),
-        begins: Numbers = ONE_RECORD,
+        begins: Integers = ONE_RECORD,
     ) -> dict[str, Varying]:
         """Evaluate over whole records.
 
@@ -140,7 +138,7 @@ class Marched:
         numbers: dict[str, float],
         shape: tuple[int, ...],
         first: Mapping[str, Any],
-        begins: Numbers,
+        begins: Integers,
     ) -> dict[str, Varying]:
         """What is remembered before each point."""
         active = sorted({*self._own, *(p for v in known.values() for p in v.slopes)})

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from ...arrays import Array
 from ...errors import InputError
 from ...inputs.exports.numbers import numbers
 from .columns import columns_of, converted, decimal_of, tables_of
@@ -17,7 +18,6 @@ from .wishes import ImportedRun, Taken, Wishes
 
 __all__ = ["Zone", "add_angles"]
 
-Array = npt.NDArray[np.float64]
 
 POINTS = ("x_mm", "y_mm", "shear_angle_deg")
 

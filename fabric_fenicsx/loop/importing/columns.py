@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ...errors import InputError
 from ...inputs.exports.numbers import clock_seconds, decimal_marks, is_clock, numbers
 from ...inputs.exports.tables import ExportedTable, find_tables
@@ -18,7 +18,6 @@ from .wishes import Taken, Wishes
 
 __all__ = ["columns_of", "converted", "decimal_of", "tables_of"]
 
-Array = npt.NDArray[np.float64]
 
 INSTEAD = {"angle_deg": "shear_angle_deg", "shear_angle_deg": "angle_deg"}
 """The column that one is 90 degrees less."""

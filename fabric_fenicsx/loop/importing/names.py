@@ -6,8 +6,8 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ...errors import InputError
 from ...inputs.exports.tables import ExportedTable
 from ...inputs.exports.units import factor, known, quantity_of, split_unit
@@ -16,7 +16,6 @@ from ...inputs.validation import suggestion
 
 __all__ = ["NoSuchColumn", "chosen", "downwards", "heading_parts"]
 
-Array = npt.NDArray[np.float64]
 
 DOWNWARDS = ("sag", "deflection", "drop", "durchbiegung", "durchhang")
 """Names of a height that is counted downwards."""

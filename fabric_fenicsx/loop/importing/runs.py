@@ -8,7 +8,6 @@ from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from ...errors import InputError
 from ...inputs.exports.numbers import numbers
@@ -24,7 +23,6 @@ from .wishes import ImportedRun, Taken, Wishes
 
 __all__ = ["read_runs"]
 
-Array = npt.NDArray[np.float64]
 
 STANDING = 0.1
 """Share of the readings, or two of them, that may have the time of the one before them."""

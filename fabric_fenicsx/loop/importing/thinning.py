@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from ...arrays import Array
+
 __all__ = ["thinned"]
 
-Array = npt.NDArray[np.float64]
 
 TOLERANCE = 0.005
 """Share of the travel's range within which a straight line is followed."""

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["ImportedRun", "Taken", "Wishes"]
+from ...arrays import Array
 
-Array = npt.NDArray[np.float64]
+__all__ = ["ImportedRun", "Taken", "Wishes"]
 
 
 @dataclass(frozen=True, slots=True)

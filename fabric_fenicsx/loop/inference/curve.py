@@ -14,17 +14,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import BSpline
 
+from ...arrays import Array, Flags
 from .experiment import OneCurve, Readings
 from .likelihood import Linearised
 from .variances import Variances, estimate
 
 __all__ = ["Curve", "smooth_curve"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Pieces of the spline, at most, and points at which it is given.
 PIECES, POINTS = 24, 101

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-import numpy.typing as npt
-
+from ...arrays import Flags
 from .curve import Curve
 from .effects import Effect
 from .experiment import Experiment
@@ -20,7 +18,6 @@ from .validation import Laboratory
 
 __all__ = ["Beside", "Candidate", "Diagnosis", "Joined", "Round", "Verdict"]
 
-Flags = npt.NDArray[np.bool_]
 Pair = tuple[str, list[Fit], str, list[Fit]]
 Verdict = Literal["no_effect", "effect_found", "effect_discovered", "unexplained"]
 

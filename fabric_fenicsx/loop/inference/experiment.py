@@ -8,8 +8,8 @@ from types import MappingProxyType
 from typing import Protocol, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Flags, Integers
 from ..copies import in_copies
 from .effects import Effect, Parameter, Variant
 
@@ -27,9 +27,6 @@ __all__ = [
 
 T = TypeVar("T")
 R = TypeVar("R")
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-Numbers = npt.NDArray[np.int64]
 
 Deviations = Mapping[str, Array]
 """By parameter, how far each specimen is from the common value, as a share, (n_specimens,)."""
@@ -80,17 +77,17 @@ class Readings:
     """
 
     observed: Array
-    run: Numbers
+    run: Integers
     holdout: Flags
     usable: Flags
     weight: Array
     names: tuple[str, ...]
     covariates: Mapping[str, Array]
-    specimen: Numbers
+    specimen: Integers
     specimens: tuple[str, ...]
-    folder: Numbers
-    chain: Numbers
-    row: Numbers | None = None
+    folder: Integers
+    chain: Integers
+    row: Integers | None = None
     model_error: Array | None = None
     others: tuple[Another, ...] = ()
 
@@ -147,7 +144,7 @@ def deviated(
     slopes: Mapping[str, Array],
     values: Mapping[str, float],
     deviations: Deviations,
-    specimen: Numbers,
+    specimen: Integers,
 ) -> tuple[Array, dict[str, Array]]:
     """Readings of specimens that differ, and their derivatives, to first order.
 

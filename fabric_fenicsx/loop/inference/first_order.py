@@ -7,9 +7,9 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import lsq_linear
 
+from ...arrays import Array
 from ...errors import SolveError
 from .effects import Parameter, Variant
 from .experiment import Experiment, each_by_itself
@@ -28,7 +28,6 @@ __all__ = [
     "signatures",
 ]
 
-Array = npt.NDArray[np.float64]
 
 #: Amplitudes are differentiated here rather than at zero, where |·| and friction have a corner.
 SMALL = 1e-9

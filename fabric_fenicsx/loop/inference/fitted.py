@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import eigh
 from scipy.stats import chi2
 
+from ...arrays import Array, Flags
 from .effects import Variant
-from .experiment import Flags, Readings
+from .experiment import Readings
 from .variances import Variances
 
 __all__ = ["Fit", "orthogonal_to", "soft_size", "uncertainty"]
 
-Array = npt.NDArray[np.float64]
 
 #: Least information about a combination of parameters, as a share of the most: round-off.
 LEAST_KNOWN = 1e-14

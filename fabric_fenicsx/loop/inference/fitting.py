@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
+from ...arrays import Array, Flags
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Parameter, Variant
-from .experiment import Experiment, Flags
+from .experiment import Experiment
 from .fitted import Fit, uncertainty
 from .likelihood import Linearised
 from .variances import Variances
@@ -29,7 +30,6 @@ __all__ = [
     "parameters_of",
 ]
 
-Array = npt.NDArray[np.float64]
 
 #: Share of the sum of squares below which a step's gain ends a fit, and one of which only the rank
 #: among others is wanted.

@@ -13,9 +13,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import least_squares, lsq_linear
 
+from ...arrays import Array
 from ...errors import SolveError
 from .effects import of_first, of_the_first
 from .experiment import Experiment
@@ -24,7 +24,6 @@ from .fitting import parameters_of
 
 __all__ = ["Foretold", "Known", "Nearest"]
 
-Array = npt.NDArray[np.float64]
 
 #: A draw changes the readings there are, |·|²/σ², by at most this many times what it should to
 #: first order ...

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Flags
 from .criteria import CRITERIA
 from .experiment import Experiment
 from .fitted import Fit
 from .validation import CrossValidation, cross_validated, parts_by, stretches
 
 __all__ = ["HeldOut"]
-
-Flags = npt.NDArray[np.bool_]
 
 
 class HeldOut:

@@ -19,12 +19,13 @@ import numpy as np
 from scipy.stats import chi2
 from scipy.stats import f as f_ratio
 
+from ...arrays import Flags
 from .criteria import CRITERIA
 from .effects import Effect, Variant
 from .experiment import Experiment
 from .fitted import Fit
 from .fitting import groups_of, linearised
-from .held_out import Flags, HeldOut
+from .held_out import HeldOut
 from .likelihood import Linearised
 from .model import Misfit, Model
 from .noise import Noise, Whiteness, missed_readings, outliers, steps_back, whiteness

@@ -12,10 +12,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import BSpline
 from scipy.linalg import solve_triangular
 
+from ...arrays import Array, Flags
 from .criteria import CRITERIA
 from .experiment import Readings
 from .noise import Noise
@@ -23,8 +23,6 @@ from .white_columns import Columns, White
 
 __all__ = ["SCATTER_UNIT", "SHARE_UNIT", "Likelihood", "Linearised"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Units in which variances are looked for: (a tenth)² of a parameter, (2 %)² of a reading.
 SCATTER_UNIT, SHARE_UNIT = 0.01, 4e-4

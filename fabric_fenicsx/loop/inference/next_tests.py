@@ -24,9 +24,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import norm
 
+from ...arrays import Array
 from ...errors import SolveError
 from ..measurement.kind import Kind
 from ..measurement.proposal import Proposal
@@ -37,7 +37,6 @@ from .foretold import Foretold, Known
 
 __all__ = ["NextTest", "best_tests", "further_runs", "next_tests", "next_tests_report"]
 
-Array = npt.NDArray[np.float64]
 
 #: Probability of rejecting a true model. Convention.
 LEVEL = 0.05

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from scipy.signal import lombscargle
 from scipy.stats import chi2
 
+from ...arrays import Array, Flags
 from .criteria import CRITERIA
 from .experiment import Readings
 
@@ -33,9 +34,6 @@ __all__ = [
     "steps_back",
     "whiteness",
 ]
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 
 class Whitener:

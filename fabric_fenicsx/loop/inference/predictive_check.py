@@ -17,16 +17,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Flags
 from .experiment import Readings
 from .fitted import Fit
 from .noise import Noise
 
 __all__ = ["Check", "predictive_check"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Replicates and the seed they are drawn with.
 DRAWS, SEED = 1000, 1

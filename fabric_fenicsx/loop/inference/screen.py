@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
+from ...arrays import Array
 from ..copies import in_copies
 from .effects import Effect, Variant
 from .first_order import Combination, Signature, ToFirstOrder
@@ -28,7 +29,6 @@ from .fitted import Fit
 
 __all__ = ["Screen", "Signatures"]
 
-Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.int64]
 Signatures = Mapping[Effect, Mapping[Variant, Sequence[Signature]]]
 

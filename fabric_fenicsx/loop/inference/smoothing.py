@@ -24,9 +24,10 @@ import numpy.typing as npt
 from scipy.signal import savgol_coeffs
 from scipy.stats import chi2
 
+from ...arrays import Array
+
 __all__ = ["Smoothed", "mean_of", "smoothed", "window_of"]
 
-Array = npt.NDArray[np.float64]
 
 #: Correlations that are looked at, to readings so far apart.
 LAGS = 12

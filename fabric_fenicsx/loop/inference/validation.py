@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from ...arrays import Flags
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Parameter, Variant
@@ -24,8 +25,6 @@ __all__ = [
     "parts_by",
     "stretches",
 ]
-
-Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,17 +19,16 @@ from types import MappingProxyType
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
+from ...arrays import Array
 from .criteria import CRITERIA
 from .likelihood import SCATTER_UNIT, SHARE_UNIT, Likelihood, Linearised
 from .noise import Noise
 
 __all__ = ["Estimate", "Variances", "averaged", "chance_of_no_misfit", "estimate"]
 
-Array = npt.NDArray[np.float64]
 
 #: Scatter, in its unit, of specimens that are all but alike.
 HARDLY = 1e-3

@@ -20,16 +20,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Flags, Integers
 from .experiment import Readings
 from .noise import steps_back
 
 __all__ = ["Columns", "White"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-Numbers = npt.NDArray[np.int64]
 
 #: Products of two numbers that take less time than a part of their own.
 LITTLE = 200_000
@@ -50,8 +47,8 @@ class _Part:
     rows: slice
     lines: Array
     weighted: Array
-    of_others: tuple[Numbers, ...]
-    of_both: tuple[Numbers, ...]
+    of_others: tuple[Integers, ...]
+    of_both: tuple[Integers, ...]
 
 
 class Columns:
@@ -106,7 +103,7 @@ class Columns:
             self.sums.append((L[own].T @ L[own], before.T @ before, mixed + mixed.T))
 
 
-def _parts(back: Numbers, there: Flags) -> list[slice]:
+def _parts(back: Integers, there: Flags) -> list[slice]:
     """Readings in a row that go together with none of the others, if that saves products.
 
     Args:

@@ -17,9 +17,9 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import nnls
 
+from ...arrays import Array, Flags
 from ...inputs.parameters import Parameter
 from ..expressions.marching import Marched, Varying
 from ..inference.effects import Effect, Variant, of_each, scaled
@@ -37,9 +37,6 @@ from .records import Records, laid_out, runs_before, typical
 from .slipping import Slips
 
 __all__ = ["CrossheadTest"]
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 
 class CrossheadTest:

@@ -9,9 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
+from ...arrays import Array, Integers
 from ...inputs.parameters import Parameter
 from ...mechanics.laws.dashpots import LinearDashpot
 from ...mechanics.laws.springs import PolynomialSpring
@@ -22,8 +20,6 @@ from .records import of_a_crossing
 
 __all__ = ["BASELINE", "CrossingMoments"]
 
-Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
 
 BASELINE = (
     Parameter("k1_N", (0.0,), 0.0, meaning="spring, moment per area and angle"),
@@ -59,7 +55,7 @@ class CrossingMoments:
         variant: FrameVariant | None,
         known: dict[str, Varying],
         values: Mapping[str, float],
-        begins: Numbers = ONE_RECORD,
+        begins: Integers = ONE_RECORD,
         *,
         again: bool = False,
     ) -> Varying:
@@ -95,7 +91,7 @@ class CrossingMoments:
         variant: FrameVariant,
         known: dict[str, Varying],
         values: Mapping[str, float],
-        begins: Numbers,
+        begins: Integers,
     ) -> Varying:
         """What the law of a term without a formula depends on; see ``of``."""
         assert variant.laws is not None

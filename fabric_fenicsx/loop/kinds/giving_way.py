@@ -24,15 +24,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import solve_banded
 
+from ...arrays import Array
 from ..expressions.marching import Varying
 from .records import Records
 
 __all__ = ["BY_TRAVEL", "Added", "in_series"]
 
-Array = npt.NDArray[np.float64]
 Added = Callable[[Any, Collection[str] | None], Varying]
 """What is added to a travel [mm], from one, with some derivatives; None: with all there are."""
 

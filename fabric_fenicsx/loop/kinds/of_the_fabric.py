@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Flags
 from ..inference.experiment import Readings
 from ..inference.noise import estimated_noise
 from ..inference.smoothing import mean_of, window_of
 
 __all__ = ["of_the_fabric"]
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 
 def of_the_fabric(

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Flags, Integers
 from ..expressions.marching import Marched, Varying
 from ..inference.effects import name_of_run
 from ..inference.experiment import Readings
@@ -20,9 +20,6 @@ from .recorded_rig import RecordedRig
 
 __all__ = ["Predicted", "numbers_of_runs", "to_own_numbers", "without", "zeros_of"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-Integers = npt.NDArray[np.int64]
 Predicted = tuple[Array, dict[str, Array]]
 """Forces at every reading [N], and their derivatives, (n,) each."""
 

@@ -8,14 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ..inference.experiment import Readings
 from .recorded_rig import RecordedRig
 
 __all__ = ["LITTLE", "ends_of", "ranges_of"]
 
-Array = npt.NDArray[np.float64]
 
 LITTLE = 0.05
 """Share of the largest size below which a reading on the other side of 0 is none."""

@@ -7,8 +7,8 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Integers
 from ...mechanics.scalars import derivative_of
 from ..expressions.marching import Marched, Varying, spread
 from .picture_frame.rig_variables import PER_SECOND
@@ -17,8 +17,6 @@ from .records import Records
 
 __all__ = ["RecordedRig"]
 
-Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
 
 #: What the crosshead itself tells at each point, and how fast that changes.
 OF_ITSELF = ("displacement", "time")
@@ -45,7 +43,7 @@ class RecordedRig:
         self,
         points: dict[str, Varying],
         records: Records,
-        readings: Numbers,
+        readings: Integers,
         compiled: dict[Any, Marched],
     ) -> None:
         self.points, self.records, self.readings = points, records, readings
@@ -54,7 +52,7 @@ class RecordedRig:
         self.given: dict[str, Varying] = {}
         self._unknown = np.flatnonzero(readings < 0)
 
-    def of_runs(self, runs: Numbers) -> RecordedRig:
+    def of_runs(self, runs: Integers) -> RecordedRig:
         """The same of some runs alone."""
         here = np.isin(self.records.run, runs)
         points = {name: Varying(x.value[here]) for name, x in self.points.items()}

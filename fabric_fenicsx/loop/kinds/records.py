@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...arrays import Array, Integers
 from ...inputs.parameters import Parameter
 from ...mechanics.laws.law import Crossing
 from ..expressions.marching import Marched, Varying, spread
@@ -31,8 +32,6 @@ __all__ = [
     "typical",
 ]
 
-Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
 
 #: Runs before another that a term by the run needs: what two runs differ by is anything.
 FEWEST_BEFORE = 2
@@ -52,43 +51,43 @@ class Records:
         run: number of the run of each point, not falling, (n_points,).
     """
 
-    run: Numbers
+    run: Integers
 
     @cached_property
-    def begins(self) -> Numbers:
+    def begins(self) -> Integers:
         """The first point of each record, (n_records,)."""
         return np.flatnonzero(np.diff(self.run, prepend=-1))
 
     @property
-    def runs(self) -> Numbers:
+    def runs(self) -> Integers:
         """The runs that there are, (n_records,)."""
         return self.run[self.begins]
 
     @cached_property
-    def ends(self) -> Numbers:
+    def ends(self) -> Integers:
         """The last point of each record, (n_records,)."""
         return np.flatnonzero(np.diff(self.run, append=self.run[-1] + 1))
 
     @cached_property
-    def before(self) -> Numbers:
+    def before(self) -> Integers:
         """The point before each one, or itself where a record begins, (n_points,)."""
         found = np.arange(-1, len(self.run) - 1)
         found[self.begins] = self.begins
         return found
 
     @cached_property
-    def after(self) -> Numbers:
+    def after(self) -> Integers:
         """The point after each one, or itself where a record ends, (n_points,)."""
         found = np.arange(1, len(self.run) + 1)
         found[self.ends] = self.ends
         return found
 
     @cached_property
-    def first(self) -> Numbers:
+    def first(self) -> Integers:
         """The first point of the record that each one is of, (n_points,)."""
         return self.at_points(self.begins)
 
-    def at_points(self, of_each: Numbers) -> Numbers:
+    def at_points(self, of_each: Integers) -> Integers:
         """A number of each record, (n_records,), at its points."""
         return np.repeat(of_each, 1 + self.ends - self.begins)
 
@@ -113,7 +112,7 @@ class Records:
         return np.asarray(sums - sums[self.first])
 
 
-def laid_out(motions: Sequence[Motion]) -> tuple[dict[str, Varying], Records, Numbers]:
+def laid_out(motions: Sequence[Motion]) -> tuple[dict[str, Varying], Records, Integers]:
     """Records one after the other.
 
     Returns:

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ..expressions.marching import Varying
 from ..inference.first_order import SMALL
 from .giving_way import BY_TRAVEL, Added, in_series
@@ -20,7 +20,6 @@ from .records import Records
 
 __all__ = ["Slips", "left_by"]
 
-Array = npt.NDArray[np.float64]
 _Known = tuple[Any, dict[str, float], tuple[Varying, ...]]
 """Forms of a model, its numbers, and what slipped."""
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...arrays import Array
 from ...inputs.groups import Keys
 from ...inputs.tables import Column
 from ..inference.effects import Variant
@@ -19,7 +20,6 @@ from .schema import Measurement, RunKeys
 
 __all__ = ["Kind", "MadeUp", "Mistake", "called_later"]
 
-Array = npt.NDArray[np.float64]
 Mistake = tuple[str, npt.NDArray[np.bool_], str]
 """A column, where its readings are wrong, (n,), and what is allowed there."""
 

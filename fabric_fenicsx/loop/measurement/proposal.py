@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ..inference.experiment import Experiment
 from .schema import Measurement, Run
 
@@ -23,7 +23,6 @@ __all__ = [
     "typical_speed",
 ]
 
-Array = npt.NDArray[np.float64]
 
 #: Fewest intervals between readings on a leg: its rate is to be found from them.
 FEWEST = 10

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 import yaml
 from pydantic import Field, create_model
 
+from ...arrays import Array
 from ...errors import InputError
 from ...inputs.groups import Keys, Positive
 from ...inputs.keys import plain
@@ -21,7 +21,6 @@ from .schema import FILE, SCHEMA, Measurement, MeasurementKeys, Run, RunKeys
 
 __all__ = ["measurement_models", "read_folder", "write_folder"]
 
-Array = npt.NDArray[np.float64]
 
 #: Keys of an entry of ``runs`` that every kind has.
 COMMON = RunKeys.model_fields

@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ..inference.experiment import Readings
 from .schema import Measurement
 
 __all__ = ["common_noise", "readings_of", "specimens_of"]
-
-Array = npt.NDArray[np.float64]
 
 
 def readings_of(

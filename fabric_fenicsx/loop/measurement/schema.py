@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
+from ...arrays import Array
 from ...inputs.groups import Keys, Positive
 from ...rigs.cases import TowKeys
 from ...rigs.common import KG_M2, TONNE, section
@@ -31,7 +31,6 @@ __all__ = [
     "fabric_keys",
 ]
 
-Array = npt.NDArray[np.float64]
 
 SCHEMA = "fabric-measurement/1"
 FILE = "measurement.yaml"

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from scipy.optimize import OptimizeWarning, curve_fit
 
+from ...arrays import Array
 from ...mechanics.scalars import derivative_of, numpy_function, symbol
 from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Effect, Shape, Variant
@@ -19,7 +19,6 @@ from .words import parameter_unit
 
 __all__ = ["Discovered", "discovered_report", "discovered_terms", "names_of"]
 
-Array = npt.NDArray[np.float64]
 
 #: Points of a shape that is shown.
 POINTS = 101

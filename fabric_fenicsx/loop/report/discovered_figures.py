@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ...arrays import Array
 from ..inference.diagnosis import Diagnosis
 from ..inference.effects import Variant
 from ..inference.fitted import Fit
@@ -17,7 +17,6 @@ from .residuals import residual_points
 
 __all__ = ["discovered_figure"]
 
-Array = npt.NDArray[np.float64]
 
 #: Values of the other variable that a shape over two is drawn at.
 LEVELS = 4

@@ -7,11 +7,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ...arrays import Array
 from ..inference.diagnosis import Diagnosis
 from ..inference.experiment import Another
 from ..inference.fitted import Fit
@@ -34,7 +34,6 @@ from .drawing import (
 
 __all__ = ["candidates_figure", "curve_figure", "data_figure", "law_figure", "reading_std"]
 
-Array = npt.NDArray[np.float64]
 
 LAW_AXES = {"curvature_1_mm": "curvature [1/mm]", "moment_N": "moment per width [N]"}
 CURVE_AXES = {"shear_angle_rad": "shear angle [rad]", "moment_N": "shear moment per area [N]"}

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, StrMethodFormatter
 
+from ...arrays import Array, Integers
 from ..inference.diagnosis import Diagnosis
 from ..inference.fitted import Fit
 from ..kinds import kind_of
@@ -37,8 +37,6 @@ __all__ = [
     "residual_points",
 ]
 
-Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
 
 #: Largest residual over noise that a linear axis shows together with noise.
 TOO_LARGE = 12.0
@@ -189,7 +187,7 @@ def noise_figure(diagnosis: Diagnosis) -> Figure:
     return figure
 
 
-def autocorrelation(white: Array, chain: Numbers, most: int) -> tuple[Array, Numbers]:
+def autocorrelation(white: Array, chain: Integers, most: int) -> tuple[Array, Integers]:
     """Correlation of a residual with itself some readings later in the same line.
 
     Args:

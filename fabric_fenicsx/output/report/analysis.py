@@ -21,9 +21,10 @@ from fabric_fenicsx.output.surfaces import TriangleSurface
 from fabric_fenicsx.output.tool_distance import ToolDistance, deepest_penetration, tool_distance
 from fabric_fenicsx.output.wrinkles import Wave, in_plane_waves, tow_waves
 
+from ...arrays import Array
+
 __all__ = ["Against", "Analysis", "Drape", "Measured", "Settings", "analysed"]
 
-Array = npt.NDArray[np.float64]
 
 #: Principal curvature towards the fabric from which a tool counts as hollow [1/mm].
 HOLLOW = 1e-3

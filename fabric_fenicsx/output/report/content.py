@@ -14,9 +14,10 @@ from fabric_fenicsx.output.pattern import area, nesting_box
 from fabric_fenicsx.output.report.analysis import Against, Analysis, Drape
 from fabric_fenicsx.output.thickness import flat_fabric
 
+from ...arrays import Array
+
 __all__ = ["SCHEMA", "content"]
 
-Array = npt.NDArray[np.float64]
 
 SCHEMA = "fabric-drape-report/1"
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -20,9 +19,10 @@ from fabric_fenicsx.output.report.maps import (
     scale,
 )
 
+from ...arrays import Array
+
 __all__ = ["figures"]
 
-Array = npt.NDArray[np.float64]
 
 #: Colours of lines that are told apart by those who see fewer colours too (Okabe & Ito).
 LINES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00")

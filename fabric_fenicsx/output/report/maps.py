@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from fabric_fenicsx.output.draped import DrapedSheet
+
+from ...arrays import Array
 
 __all__ = [
     "DIVERGING",
@@ -25,7 +26,6 @@ __all__ = [
     "scale",
 ]
 
-Array = npt.NDArray[np.float64]
 
 # Both keep their order for those who see fewer colours, and printed in grey the first one does.
 SEQUENTIAL, DIVERGING = "viridis", "PuOr"

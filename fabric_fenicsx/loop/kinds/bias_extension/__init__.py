@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
+from ....arrays import Array
 from ....inputs.groups import Keys, Positive
 from ....inputs.tables import Column
 from ...measurement.kind import Kind, Mistake, called_later
@@ -17,7 +17,6 @@ from ...measurement.schema import RunKeys
 
 __all__ = ["BIAS_EXTENSION", "BiasExtensionRig", "StripRunKeys"]
 
-Array = npt.NDArray[np.float64]
 
 #: Share of the largest travel by which a crosshead may come back past its start, or be read there.
 OVERSHOT = 0.1

@@ -21,8 +21,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array, Flags
 from ...inference.effects import Variant
 from ...inference.experiment import NO_DEVIATIONS, Deviations
 from .mixture import Part, number
@@ -33,8 +33,6 @@ from .ways import Way
 
 __all__ = ["CentredBiasExtension"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Change of an amplitude that its derivative is taken over, as a share, and of which start of it
 #: where it is nothing.

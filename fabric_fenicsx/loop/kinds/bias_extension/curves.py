@@ -11,17 +11,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import PPoly
 
+from ....arrays import Array, Flags
 from ....errors import SolveError
 from ....mechanics.laws.tabulated import TabulatedSpring
 from ...expressions.marching import Varying
 
 __all__ = ["KNOTS", "NOTHING", "Curve", "Moment", "at_knots"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 Moment = Callable[[dict[str, Varying]], Varying]
 """Moment per area [N/mm] at points of ways, (n, n_ways), from what laws need: "gamma", "gamma_n"

@@ -22,8 +22,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ....fabric.bias_strip import BiasStrip
 from ....inputs.parameters import Parameter
 from ...expressions.marching import Varying, spread
@@ -32,7 +32,6 @@ from .mixture import Part, Travels, number, of_ways
 
 __all__ = ["EVEN", "IN_WORDS", "SHARES", "ZONES", "EvenZones", "beside", "of_both"]
 
-Array = npt.NDArray[np.float64]
 
 EVEN = Parameter(
     "even_share",

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ....inputs.parameters import Parameter
 from ....mechanics.laws.dashpots import LinearDashpot
 from ....mechanics.laws.law import Crossing
@@ -39,7 +39,6 @@ __all__ = [
     "locking_variant",
 ]
 
-Array = npt.NDArray[np.float64]
 
 FRAME_SHARE = "of_the_frame"
 #: Label of the form.

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ...expressions.marching import Varying, spread
 from .even_shear import SHARES, EvenZones, beside
 from .going_runs import GoingRuns
 from .mixture import Part, Travels, of_groups
 
 __all__ = ["gone"]
-
-Array = npt.NDArray[np.float64]
 
 
 def gone(

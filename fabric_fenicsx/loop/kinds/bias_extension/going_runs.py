@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Integers
 from ..records import Records
 
 __all__ = ["GoingRuns"]
-
-Numbers = npt.NDArray[np.int64]
 
 
 class GoingRuns:
@@ -27,7 +25,7 @@ class GoingRuns:
         at: of each point that of its crossings among these, (n_points,).
     """
 
-    def __init__(self, records: Records, goes_as: Numbers) -> None:
+    def __init__(self, records: Records, goes_as: Integers) -> None:
         here, own = records.runs, goes_as[records.runs]
         own = np.where(np.isin(own, here), own, here)
         self.runs = np.unique(own)

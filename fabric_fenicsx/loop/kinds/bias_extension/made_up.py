@@ -11,8 +11,8 @@ from typing import Any
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ....errors import InputError
 from ....rigs.bias_extension import BiasExtensionCase, build
 from ....rigs.common import Session
@@ -30,7 +30,6 @@ from .strip import pulled
 
 __all__ = ["made_up"]
 
-Array = npt.NDArray[np.float64]
 
 #: The case's rate and ten times that, its length and this many times that.
 RATES, LENGTHS = (1.0, 10.0), (1.0, 1.25)

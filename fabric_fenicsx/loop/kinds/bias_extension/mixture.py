@@ -9,8 +9,8 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ...expressions.marching import Varying
 from ...kept import Kept
 from ..records import Records
@@ -21,7 +21,6 @@ from .ways import GROUPS, Name, polynomial
 
 __all__ = ["Holds", "Part", "Travels", "number", "of_groups", "of_ways"]
 
-Array = npt.NDArray[np.float64]
 
 #: How much of what solved strips say is kept, each of some quantity of all runs, and numbers of it.
 KEPT, MOST_NUMBERS = 60, 12_000_000

@@ -21,8 +21,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ....errors import SolveError
 from ....rigs.fabric_file import FabricFile
 from ...expressions.marching import Varying
@@ -54,8 +54,6 @@ from .ways import GROUPS
 
 __all__ = ["BiasExtension"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Share of a net of which corrections by a few per cent are not worth a solve.
 LITTLE_NET = 0.05

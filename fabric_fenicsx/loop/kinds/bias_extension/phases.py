@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
+from ....arrays import Array, Flags
 from ..records import Records
 
 __all__ = [
@@ -24,8 +25,6 @@ __all__ = [
     "speed_out",
 ]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 Phases = npt.NDArray[np.int8]
 
 #: Share of its travel that a strip must have been let back by: less is the noise of a record.

@@ -7,8 +7,8 @@ from dataclasses import replace
 from math import sqrt
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ...inference.effects import Variant
 from ...inference.experiment import NO_DEVIATIONS, Deviations
 from ...measurement.proposal import (
@@ -28,7 +28,6 @@ from .quantities import ANGLE, LEAST_ANGLE, force_noise, strip_of
 
 __all__ = ["OfTheFabric", "proposals"]
 
-Array = npt.NDArray[np.float64]
 
 #: Another strip is this many times as long or as wide.
 LONGER, WIDER = 1.5, 1.5

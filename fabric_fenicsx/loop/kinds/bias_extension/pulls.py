@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ....arrays import Array, Flags
 from ...measurement.schema import Measurement, Run
 from ..records import Records
 from .phases import (
@@ -23,8 +24,6 @@ from .phases import (
 
 __all__ = ["Pulls", "pulls_of"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Speeds of the crosshead that are told apart differ by this factor; of others strips are solved
 #: at the mean. Half as much again of a dashpot is not foretold where tows slip.

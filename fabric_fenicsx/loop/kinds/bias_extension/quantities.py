@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from ....arrays import Flags
 from ....errors import InputError
 from ....fabric.bias_strip import BiasStrip
 from ...inference.experiment import Another, Readings
@@ -30,8 +31,6 @@ __all__ = [
     "strip_of",
 ]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 ANGLE = "shear_angle_deg"
 #: Fewest readings of a run of either quantity.

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
+from ....arrays import Array
 from ...expressions.marching import Varying
 from ..records import Records
 from .mixture import Holds, Part, Travels, number, of_groups, of_ways
@@ -19,7 +19,6 @@ from .strip import SOON
 
 __all__ = ["Correction", "Quantity", "correction"]
 
-Array = npt.NDArray[np.float64]
 
 #: Shares of the whole travel at which they are compared, more of them where a way begins.
 ALONG = np.unique([*np.linspace(0.0, 1.0, 60), *SOON, *(1.0 - SOON)])

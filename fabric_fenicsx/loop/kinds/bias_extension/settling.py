@@ -18,8 +18,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array, Flags
 from ....errors import SolveError
 from ...inference.diagnosis import Round
 from ...inference.effects import Variant
@@ -33,8 +33,6 @@ from .effects import StripPullVariant
 
 __all__ = ["Settled", "Settling", "left_out"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 Deviations = Mapping[str, Array]
 """Of all specimens, by group of parameters; see Fit."""
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ....arrays import Array
 from ....errors import SolveError
 from ...copies import put_off_in_copies
 from ...measurement.schema import Measurement, Run
@@ -35,8 +36,6 @@ __all__ = [
     "reached",
 ]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Share of the work by which a curve may differ from the one that a strip was solved with.
 NEAR = 0.35

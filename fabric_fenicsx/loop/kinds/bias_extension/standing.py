@@ -20,9 +20,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
+from ....arrays import Array
 from ....errors import SolveError
 from ....rigs.bias_extension import BiasExtensionCase, clamps, middle_zone
 from ....rigs.crosshead import crosshead
@@ -31,7 +31,6 @@ from ....solving.newton import Newton
 
 __all__ = ["AtRest", "Hold", "Standing"]
 
-Array = npt.NDArray[np.float64]
 
 #: Share of the whole travel that derivatives are taken over: a change of 1e-4 or so of an angle.
 SHARE = 1e-4

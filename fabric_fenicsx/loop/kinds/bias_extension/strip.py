@@ -16,9 +16,9 @@ from typing import Any
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
 
 from ...._dolfinx import Function
+from ....arrays import Array
 from ....errors import InputError, SolveError
 from ....mechanics.laws.law import Crossing
 from ....mechanics.laws.tabulated import TabulatedSpring
@@ -37,7 +37,6 @@ from .standing import AtRest, Hold, Standing
 
 __all__ = ["SOON", "StripPath", "pulled", "solved_strip", "strip_case"]
 
-Array = npt.NDArray[np.float64]
 
 #: Steps of a way out, if none fails: where others are foretold of it, and where it is itself meant.
 STEPS, FINE_STEPS = 18, 40

@@ -11,9 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
+from ....arrays import Array
 from ....errors import SolveError
 from ...expressions.marching import Varying
 from ...inference.effects import Variant
@@ -32,7 +30,6 @@ from .strip import FINE_STEPS
 
 __all__ = ["StripModels", "WaysOut", "changes_of", "pulled", "solved_by"]
 
-Array = npt.NDArray[np.float64]
 
 #: Parameter of the baseline's dashpot.
 DASHPOT = "c1_N_s"

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
+from ....arrays import Array
 from .curves import Curve
 from .phases import SIGN, Phase, Phases
 from .standing import AtRest, Hold
@@ -20,7 +21,6 @@ from .strip import SOON, StripPath
 
 __all__ = ["GROUPS", "Name", "Stopped", "Way", "alike", "polynomial", "way_of"]
 
-Array = npt.NDArray[np.float64]
 Name = Literal["gamma", "lever", "rest", "middle"]
 
 #: Groups of crossings that go alike.

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ....errors import SolveError
 from ...inference.criteria import CRITERIA
 from ...inference.diagnosis import Diagnosis, Joined
@@ -42,7 +42,6 @@ from .settling import Settled, Settling, left_out
 
 __all__ = ["SharedLocking", "join", "shared_locking", "way_out"]
 
-Array = npt.NDArray[np.float64]
 Law = tuple[Array, Array]
 """Angles [rad], increasing, and moments per area [N/mm], (n,) each."""
 

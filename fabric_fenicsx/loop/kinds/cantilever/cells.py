@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg.lapack import dgtsv, dpttrf
 
-__all__ = ["Cells"]
+from ....arrays import Array
 
-Array = npt.NDArray[np.float64]
+__all__ = ["Cells"]
 
 
 class Cells:

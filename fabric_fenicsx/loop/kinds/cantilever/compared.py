@@ -6,15 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
+from ....arrays import Array, Integers
 from .hanging import SHARES, HangingTows
 
 __all__ = ["HungStrips", "expected_heights", "places_on"]
 
-Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
 
 #: Newton's iterations on the place that is nearest to a reading, from the nearest node.
 ITERATIONS = 6
@@ -35,11 +33,11 @@ class HungStrips:
     """
 
     tows: HangingTows
-    specimens: Numbers
+    specimens: Integers
     upside_down: bool
-    rows: Numbers
-    tow: Numbers
-    run: Numbers
+    rows: Integers
+    tow: Integers
+    run: Integers
     s: Array
     x: Array
     z: Array

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array, Integers
 from .variant import StripVariant
 
 __all__ = ["EachSpecimen", "names_of"]
 
-Array = npt.NDArray[np.float64]
-Numbers = npt.NDArray[np.int64]
 
 #: A specimen that is not fitted.
 UNFITTED = -1
@@ -42,7 +40,7 @@ class EachSpecimen:
         return {**values, **own}
 
     def of_each(
-        self, values: Mapping[str, float | Array], specimens: Numbers
+        self, values: Mapping[str, float | Array], specimens: Integers
     ) -> dict[str, float | Array]:
         """All values as specimens have them; one that has none of its own has the others' mean.
 
@@ -62,7 +60,7 @@ class EachSpecimen:
     def _own(self, values: Mapping[str, float | Array], shared: str, specimen: int) -> np.float64:
         return np.mean(np.array([values[name] for name in self._names(shared, specimen)]))
 
-    def slopes(self, slopes: Mapping[str, Array], specimens: Numbers) -> dict[str, Array]:
+    def slopes(self, slopes: Mapping[str, Array], specimens: Integers) -> dict[str, Array]:
         """Derivatives in the model's parameters, from those in what each specimen has.
 
         Args:

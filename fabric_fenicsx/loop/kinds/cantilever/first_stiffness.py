@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ....errors import SolveError
 from .compared import HungStrips, expected_heights
 from .hanging import HangingTows
 
 __all__ = ["first_C1"]
 
-Array = npt.NDArray[np.float64]
 
 #: Loads w L³/B of the longest strip at which C1 is looked for.
 LOADS = np.logspace(-2.0, 3.0, 51)

@@ -24,8 +24,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ....errors import SolveError
 from ....fabric.section import RectangularSection
 from ...expressions.marching import Marched, Varying
@@ -33,7 +33,6 @@ from .cells import Cells
 
 __all__ = ["SHARES", "HangingTows", "Laws", "Shapes", "Tow", "sum_of"]
 
-Array = npt.NDArray[np.float64]
 
 #: Cells of a tow; the shape is wrong by 0.01 mm in 250 mm at a weight w L³ of 45 B.
 CELLS = 64

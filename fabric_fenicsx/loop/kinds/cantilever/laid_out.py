@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ....arrays import Array
 from ...measurement.readings import specimens_of
 from ...measurement.schema import Measurement
 from ..records import FEWEST_BEFORE, earlier_alike
@@ -15,8 +16,6 @@ from .compared import HungStrips
 from .hanging import HangingTows, Tow
 
 __all__ = ["LaidOut", "laid_out"]
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ....rigs.cantilever import CantileverCase
 from ...inference.effects import Effect
 from ...measurement.kind import MadeUp
@@ -17,7 +17,6 @@ from .model import Cantilever
 
 __all__ = ["made_up"]
 
-Array = npt.NDArray[np.float64]
 
 #: Heights are predicted this many times finer than they are written.
 FINER = 8

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
+
+from ....arrays import Array
 
 __all__ = ["scatter_of_x", "smooth_line"]
 
-Array = npt.NDArray[np.float64]
 
 #: Degree of the polynomials that smooth a measured line.
 SMOOTH = 5

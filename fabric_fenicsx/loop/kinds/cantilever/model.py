@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ....arrays import Array, Flags
 from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Parameter, Variant, of_each, scaled
@@ -42,8 +43,6 @@ from .variant import StripVariant
 
 __all__ = ["Cantilever"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: C1 is looked for within this factor of its start.
 REACH = 1e3

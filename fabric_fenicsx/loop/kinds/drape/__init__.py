@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
+from ....arrays import Array
 from ....inputs.groups import Keys, Positive
 from ....inputs.tables import Column
 from ...measurement.kind import Kind, Mistake, called_later
 
 __all__ = ["DRAPE", "DrapeRig"]
-
-Array = npt.NDArray[np.float64]
 
 
 class DrapeRig(Keys):

@@ -28,6 +28,7 @@ import numpy.typing as npt
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import gaussian_filter
 
+from ....arrays import Array, Flags
 from ....errors import SolveError
 from ....rigs.drape import DrapeCase
 from ....rigs.fabric_file import FabricFile, with_fabric
@@ -53,8 +54,6 @@ from .variant import DrapeVariant
 
 __all__ = ["Drape"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: Cells between two crossings.
 MESH = 2

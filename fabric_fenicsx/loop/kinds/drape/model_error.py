@@ -22,11 +22,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import eigh
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
 
+from ....arrays import Array
 from ....errors import InputError, SolveError
 from ....rigs.drape import DrapeCase
 from ....rigs.levels import same_fabric
@@ -34,7 +34,6 @@ from .shear_field import Net, ShearField, Solve
 
 __all__ = ["OTHER_MESH", "ModelError", "error_of", "matern"]
 
-Array = npt.NDArray[np.float64]
 Difference = tuple[ShearField, ShearField]
 """One field less another."""
 

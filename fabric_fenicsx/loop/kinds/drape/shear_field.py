@@ -12,9 +12,9 @@ from typing import Any
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline, RectBivariateSpline
 
+from ....arrays import Array
 from ....errors import InputError, SolveError
 from ....rigs.common import Session, control
 from ....rigs.drape import DrapeCase, build
@@ -34,7 +34,6 @@ __all__ = [
     "solved_field",
 ]
 
-Array = npt.NDArray[np.float64]
 
 #: Weights of 1 − δ⁴/16, in sixteenths.
 SHAPIRO = (-1.0, 4.0, 10.0, 4.0, -1.0)

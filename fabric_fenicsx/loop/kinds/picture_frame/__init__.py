@@ -6,16 +6,14 @@ import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
+from ....arrays import Array
 from ....inputs.groups import Keys, Positive
 from ....inputs.tables import Column
 from ...measurement.kind import Kind, Mistake, called_later
 
 __all__ = ["PICTURE_FRAME", "PictureFrameRig"]
-
-Array = npt.NDArray[np.float64]
 
 
 class PictureFrameRig(Keys):

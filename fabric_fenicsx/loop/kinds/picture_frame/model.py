@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from ufl import acos, sin
 
+from ....arrays import Array
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Variant
@@ -39,7 +40,6 @@ from .variant import FrameVariant
 
 __all__ = ["PictureFrame"]
 
-Array = npt.NDArray[np.float64]
 
 #: Share by which speeds may differ that are one.
 SAME_RATE = 0.1

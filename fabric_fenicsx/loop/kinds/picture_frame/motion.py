@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
+from ....arrays import Array, Flags
+
 __all__ = ["Motion", "crosshead_motion", "frame_motion", "motion"]
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 #: A change of speed is a corner if it is this much of the largest speed ...
 LEAST_JUMP = 0.05

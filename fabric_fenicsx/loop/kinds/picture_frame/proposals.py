@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from ....arrays import Array
 from ...measurement.proposal import (
     DECIMALS,
     Leg,
@@ -21,7 +21,6 @@ from ...measurement.schema import Measurement
 
 __all__ = ["proposals"]
 
-Array = npt.NDArray[np.float64]
 
 #: Largest angle of a proposal [degrees]: a frame closes at 90, and tows wedge before.
 CLOSEST = 70.0
