@@ -10,7 +10,13 @@ from fabric_fenicsx.loop.diagnose import diagnose, read_measurement
 from fabric_fenicsx.loop.inference.fitting import fit
 from fabric_fenicsx.loop.inference.judge import Judge
 from fabric_fenicsx.loop.inference.noise import Noise
-from fabric_fenicsx.loop.inference.smoothing import mean_of, smoothed, window_of
+from fabric_fenicsx.loop.inference.smoothing import (
+    Smoothed,
+    contradicted,
+    mean_of,
+    smoothed,
+    window_of,
+)
 from fabric_fenicsx.loop.inference.variances import Variances
 from fabric_fenicsx.loop.kinds.picture_frame.model import PictureFrame
 
@@ -130,6 +136,29 @@ def test_a_window_is_seen_before_anything_is_fitted(window, seed):
 )
 def test_no_window_is_seen_where_there_is_none(make, seed):
     assert window_of(forces(make, seed)) == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("make", "expected"),
+    [
+        # White, smoothed; in steps of twice the sigma of the one and of the other.
+        (lambda y: y, True),
+        (lambda y: mean(y, 8), False),
+        (lambda y: np.round(y / (2.0 * NOISE)) * 2.0 * NOISE, True),
+        (lambda y: np.round(mean(y, 8) / (0.7 * NOISE)) * 0.7 * NOISE, False),
+    ],
+)
+def test_readings_say_whether_their_errors_may_be_smoothed(make, expected, seed):
+    """However much a misfit looks like it."""
+    read = forces(make, seed)
+    steps = np.diff(np.unique(np.concatenate(read)))
+    written = float(steps.min()) if steps.min() > 1e-3 * NOISE else 0.0
+    assert contradicted(Smoothed(8, parabola=False, chance=0.5), read, written) is expected
+
+
+def test_too_few_readings_contradict_nothing():
+    assert not contradicted(Smoothed(8, parabola=False, chance=0.5), [np.arange(40.0)], 0.0)
 
 
 def test_no_window_is_seen_in_round_off():

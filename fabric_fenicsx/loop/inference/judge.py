@@ -28,8 +28,8 @@ from .fitting import groups_of, linearised
 from .held_out import HeldOut
 from .likelihood import Linearised
 from .model import Misfit, Model
-from .noise import Noise, Whiteness, missed_readings, outliers, steps_back, whiteness
-from .smoothing import Smoothed, smoothed
+from .noise import Noise, Whiteness, missed_readings, outliers, quantum, steps_back, whiteness
+from .smoothing import Smoothed, contradicted, smoothed
 from .variances import (
     Estimate,
     Variances,
@@ -179,10 +179,13 @@ class Judge(HeldOut):
         fit, readings, noise = model.fit, self._readings, model.estimate.variances.noise
         rows = fit.used
         errors = fit.residual[rows] / noise.sigma(readings)[rows]
-        starts = np.flatnonzero(steps_back(readings, rows) != 1)
+        starts = np.flatnonzero(steps_back(readings, rows) != 1)[1:]
         known = noise.whitener(readings, rows)(fit.slopes[rows] @ fit.root)
-        way = smoothed(np.split(errors, starts[1:]), float(np.sum(known**2)))
-        return way if way is not None and way.chance > CRITERIA.structure_p else None
+        way = smoothed(np.split(errors, starts), float(np.sum(known**2)))
+        if way is None or way.chance <= CRITERIA.structure_p:
+            return None
+        lines = np.split(readings.observed[rows], starts)
+        return None if contradicted(way, lines, quantum(readings, rows)) else way
 
     def _as_stated(self, noise: float) -> float:
         """What was stated, where a noise is no other: nobody knows theirs better."""

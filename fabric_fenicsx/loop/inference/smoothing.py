@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from math import comb
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +27,7 @@ from scipy.stats import chi2
 
 from ...arrays import Array
 
-__all__ = ["Smoothed", "mean_of", "smoothed", "window_of"]
+__all__ = ["Smoothed", "contradicted", "mean_of", "smoothed", "window_of"]
 
 
 #: Correlations that are looked at, to readings so far apart.
@@ -42,6 +43,8 @@ TIMES, CORNER = 4, 3.5
 AGREES, LIKELIER = 1e-3, 100.0
 #: ``CHANGED`` for these.
 CHANGED_BY_BENDS = 0.05
+#: Variances of a step that is written from which on differences are more than rounding. Convention.
+ROUGHER = 2.0
 #: Differences of this share of the largest reading are round-off.
 ROUND_OFF = 1e-9
 #: Fewest readings, all lines together, whose correlations say anything.
@@ -97,19 +100,32 @@ def window_of(lines: Sequence[Array]) -> int:
     Args:
         lines: readings in a row, in the order of time, (n_i,) each.
     """
-    largest = max((float(np.abs(line).max(initial=0.0)) for line in lines), default=0.0)
-    lines = [np.diff(line, TIMES) for line in lines if len(line) > 2 * TIMES]
-    if sum(len(line) for line in lines) < FEWEST:
+    found = _of_differences(lines)
+    if found is None:
         return 1
-    sigma = float(np.median(np.abs(np.concatenate(lines)))) / 0.6745
-    seen = [np.abs(line) < CORNER * sigma for line in lines]
-    if sigma <= ROUND_OFF * largest or not any(own.any() for own in seen):
-        # There is no noise, or steps of the readings are larger than it.
-        return 1
-    r, count = _correlations(lines, seen)
-    chances = {n: _compared(r, count, 0.0, n, False, TIMES).chance for n in (1, *MEANS)}
+    chances = {n: _compared(found.r, found.count, 0.0, n, False, TIMES).chance for n in (1, *MEANS)}
     best = max(chances, key=lambda n: chances[n])
     return best if chances[best] > max(AGREES, LIKELIER * chances[1]) else 1
+
+
+def contradicted(way: Smoothed, lines: Sequence[Array], quantum: float) -> bool:
+    """Whether readings scatter about each other as white ones do, and not as those smoothed so.
+
+    What a model has wrong changes slowly, so that its errors may look smoothed where no reading is:
+    differences of the readings themselves do not know the model. Of readings that scatter by little
+    more than the steps that they are written in, q² / 12, they say nothing.
+
+    Args:
+        way: the way of smoothing that errors agree with.
+        lines: readings in a row, in the order of time, (n_i,) each.
+        quantum: step that they are written in; 0 of none.
+    """
+    found = _of_differences(lines)
+    if found is None or found.variance < ROUGHER * quantum**2 / 12.0:
+        return False
+    white = _compared(found.r, found.count, 0.0, 1, False, TIMES).chance
+    so = _compared(found.r, found.count, 0.0, way.window, way.parabola, TIMES).chance
+    return white > max(AGREES, LIKELIER * so)
 
 
 def mean_of(values: Array, window: int) -> Array:
@@ -121,6 +137,37 @@ def mean_of(values: Array, window: int) -> Array:
 
 
 _LAG = range(1, LAGS + 1)
+
+
+@dataclass(frozen=True, slots=True)
+class _Differences:
+    """What differences of readings have in common.
+
+    Attributes:
+        r: their correlations, (LAGS,).
+        count: how many there are.
+        variance: of a reading, were its noise white.
+    """
+
+    r: Array
+    count: int
+    variance: float
+
+
+def _of_differences(lines: Sequence[Array]) -> _Differences | None:
+    """Of readings, but at corners; None where they say nothing."""
+    largest = max((float(np.abs(line).max(initial=0.0)) for line in lines), default=0.0)
+    lines = [np.diff(line, TIMES) for line in lines if len(line) > 2 * TIMES]
+    if sum(len(line) for line in lines) < FEWEST:
+        return None
+    sigma = float(np.median(np.abs(np.concatenate(lines)))) / 0.6745
+    seen = [np.abs(line) < CORNER * sigma for line in lines]
+    if sigma <= ROUND_OFF * largest or not any(own.any() for own in seen):
+        # There is no noise, or steps of the readings are larger than it.
+        return None
+    r, count = _correlations(lines, seen)
+    squares = sum(float(np.sum(line[own] ** 2)) for line, own in zip(lines, seen, strict=True))
+    return _Differences(r, count, squares / count / comb(2 * TIMES, TIMES))
 
 
 def _correlations(
