@@ -15,7 +15,7 @@ from ufl import as_ufl, as_vector
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.fabric.section import RectangularSection
 from fabric_fenicsx.mechanics.laws.coulomb import CoulombFriction
-from fabric_fenicsx.mechanics.laws.dahl import DahlFriction
+from fabric_fenicsx.mechanics.laws.dahl import DahlFriction, DahlPowerFriction
 from fabric_fenicsx.mechanics.laws.dashpots import EyringDashpot, LinearDashpot, PowerDashpot
 from fabric_fenicsx.mechanics.laws.law import Crossing
 from fabric_fenicsx.mechanics.laws.locking import Locking, SmoothLocking
@@ -213,6 +213,26 @@ def test_dahl_friction():
     )
 
 
+@pytest.mark.parametrize("exponent", [1.3, 2.0, 3.0])
+def test_dahl_friction_with_an_exponent(exponent):
+    """dM/dγ = k (1 − M sign(γ̇)/m)ⁱ, integrated; at an exponent of nearly 1 what has none says."""
+
+    def slope(direction):
+        return lambda x, M: direction * 10.0 * (1.0 - direction * M) ** exponent
+
+    path, expected = [0.05, 0.2, 0.1, -0.3], [0.0]
+    for old, new in pairwise([0.0, *path]):
+        way = slope(np.sign(new - old))
+        solved = solve_ivp(way, (0.0, abs(new - old)), expected[-1:], rtol=1e-9, atol=1e-11)
+        expected.append(solved.y[0, -1])
+    law = DahlPowerFriction(1.0, 0.1, exponent=exponent)
+    assert moments(law, path) == pytest.approx(expected[1:], rel=1e-7)
+    nearly = DahlPowerFriction(1.0, 0.1, 2.0, exponent=1.0 + 1e-6)
+    assert moments(nearly, path) == pytest.approx(
+        moments(DahlFriction(1.0, 0.1, 2.0), path), rel=1e-4
+    )
+
+
 def test_friction_that_grows_as_the_angle_presses_the_tows_together():
     """The limit is m_c (1 + a |γ|): twice m_c at 1/a, both ways; Dahl's by its formula there."""
     path = [0.05, 0.5, 0.25, -0.5]
@@ -242,7 +262,7 @@ def test_friction_is_rate_independent():
     path = [0.05, 0.2, 0.1]
     pressed = PressedFriction(1.0, 0.1, 2.0, 1.5)
     dahl = DahlFriction(1.0, 0.1), DahlFriction(1.0, 0.1, 2.0)
-    for law in (CoulombFriction(1.0, 0.1), *dahl, pressed):
+    for law in (CoulombFriction(1.0, 0.1), *dahl, DahlPowerFriction(1.0, 0.1), pressed):
         assert moments(law, path) == pytest.approx(moments(law, path, length=0.1))
     slow, fast = (moments(LinearDashpot(7.0), path, length=h) for h in (1.0, 0.1))
     assert fast == pytest.approx(10.0 * slow)

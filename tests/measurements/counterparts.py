@@ -17,7 +17,7 @@ COUNTERPARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "coulomb": SLIDING,
         "tanh": SLIDING,
         "stick": ("Coulomb with stick", "two sliders"),
-        "dahl": ("Dahl", "Dahl, growing with the angle"),
+        "dahl": ("Dahl", "Dahl, growing with the angle", "Dahl, with an exponent"),
     },
     "crossover_relaxation": {
         "short": ("one branch", "one branch, cubic", "two branches"),

@@ -140,6 +140,14 @@ class Effect:
         return not self.acts_on
 
     @property
+    def over_two_variables(self) -> bool:
+        """Whether such a term has as much freedom as two over one variable.
+
+        Of a dashpot or a friction the rate or its direction is no second one.
+        """
+        return self.of_two or len({*self.depends_on} - {"rate", "direction"}) > 1
+
+    @property
     def one_of_many(self) -> bool:
         """Whether it is a term that is looked for among many: not one that has zeros of runs alone.
 

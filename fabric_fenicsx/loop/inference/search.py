@@ -154,7 +154,7 @@ def _against_a_term(search: Search, further: Search, doubt: _Doubt) -> Diagnosis
         # Then the other one is as good, and says what there is.
         least = -CRITERIA.decisive
     gain = final.criterion - other.criterion_after
-    if _at_the_edge(other.final) or any(effect.of_two for effect in other.effects):
+    if _at_the_edge(other.final) or any(effect.over_two_variables for effect in other.effects):
         # It may stand for another law as well as they, or is no simpler than two of them.
         least = CRITERIA.decisive
     one = other.effects[0] if len(other.effects) == 1 else None

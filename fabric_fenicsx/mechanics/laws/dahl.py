@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
+from pydantic import Field
 from ufl import conditional, exp, ge, max_value, min_value
 
+from ...inputs.parameters import Parameter
 from .coulomb import GROWTH, CoulombFriction, friction_numbers
-from .law import Crossing, Form, size_of
+from .law import Crossing, Form, number, size_of
+from .shapes import LEAST
 
-__all__ = ["DahlFriction", "stick_of_limit_one"]
+__all__ = ["DahlFriction", "DahlPowerFriction", "stick_of_limit_one"]
+
+MoreThanOne = Annotated[float, Field(gt=1.0)]
+#: From little more than that of an exponential approach to the limit, on.
+EXPONENT = Parameter("exponent", (2.0,), 1.02, 4.0, meaning="of what is left to the limit")
 
 
 def stick_of_limit_one(past: Any, step: Any, ends: tuple[float, float] = (-1.0, 1.0)) -> Any:
@@ -36,7 +43,7 @@ class DahlFriction(CoulombFriction):
 
     law = "dahl_friction"
     name = "Dahl friction"
-    forms = (
+    forms: ClassVar[tuple[Form, ...]] = (
         Form("crossover_friction", "Dahl", (friction_numbers(),), rank=2),
         Form(
             "crossover_friction",
@@ -54,3 +61,38 @@ class DahlFriction(CoulombFriction):
         forth = limit + (past - limit) * exp(-max_value(step, 0))
         back = -limit + (past + limit) * exp(min_value(step, 0))
         return conditional(ge(step, 0), forth, back)
+
+
+@dataclass(frozen=True)
+class DahlPowerFriction(DahlFriction):
+    """Dahl's friction with his exponent: dM/dγ = k (1 − M sign(γ̇)/m)ⁱ, i > 1.
+
+    The larger i, the longer it takes to slide. With ψ = M²/2k it loses
+    M (1 − (1 − M sign(γ̇)/m)ⁱ) |γ̇| sign(γ̇), which is never negative.
+
+    Attributes:
+        exponent: i [-].
+    """
+
+    exponent: Any = number("exponent", "i, of what is left to the limit", MoreThanOne, 2.0)
+
+    law = "dahl_power_friction"
+    name = "Dahl exponent friction"
+    forms: ClassVar[tuple[Form, ...]] = (
+        Form(
+            "crossover_friction",
+            "Dahl, with an exponent",
+            (friction_numbers() | {"exponent": EXPONENT},),
+            rank=7,
+        ),
+    )
+
+    def moment(self, at: Crossing) -> Any:
+        """±m (1 − u), of u = 1 ∓ M/m exactly: u¹⁻ⁱ grows by (i − 1) k |Δγ|/m."""
+        limit, i = self.limit_at(at), at.number(self.exponent)
+        step = at.number(self.stiffness) * at.change / limit
+        sign = conditional(ge(step, 0), 1.0, -1.0)
+        # A limit that has fallen cuts it. Of nothing the power has a derivative in i as well.
+        left = max_value(1 - sign * at.past("moment") / limit, LEAST)
+        slower = 1 + (i - 1) * left ** (i - 1) * size_of(step)
+        return sign * limit * (1 - left * slower ** (1 / (1 - i)))
