@@ -245,8 +245,9 @@ class _Model:
                 for group, deviation in self._deviations(x).items()
                 for name in self._groups[group]
             }
-            found = test.predict(self._variants, values, deviations)
             # Where an angle is at the end of its range the force is a number, its slope is none.
+            with np.errstate(all="ignore"):
+                found = test.predict(self._variants, values, deviations)
             if not all(
                 np.isfinite(one[self._used]).all() for one in (found[0], *found[1].values())
             ):
@@ -261,10 +262,10 @@ class _Model:
         columns = [slopes[name] for name in self._names]
         value = dict(zip(self._names, x, strict=False))
         for group, deviation in self._deviations(x).items():
-            # θ (1 + δ): from the derivative in θ to that in δ.
+            # θ (1 + δ): from the derivative in θ to that in δ. It may be none of other readings.
             whole = sum(slopes[name] * value[name] for name in self._groups[group])
             whole = whole / (1.0 + deviation[self._readings.specimen])
-            columns += [whole * (self._readings.specimen == s) for s in specimens]
+            columns += [np.where(self._readings.specimen == s, whole, 0.0) for s in specimens]
         return np.column_stack(columns) if columns else np.zeros((len(self._used), 0))
 
 
