@@ -347,7 +347,8 @@ def test_a_term_that_is_a_listed_effect_says_so(kind, term, name):
     ranges = dict.fromkeys(REACHED, 1.0)
     ranges |= {"length": 250.0, "curvature": 0.01, "x": 200.0, "z": 100.0}
     ranges |= {"stiffness_per_C1": 1e-5, "runs": 1.0, "overhangs": 3.0}
-    every = strip_terms(ranges, ()) if kind == "cantilever" else frame_terms(ranges)
+    both_ways = {"displacement": (-1.0, 1.0)}
+    every = strip_terms(ranges, ()) if kind == "cantilever" else frame_terms(ranges, both_ways)
     (effect,) = (e for e in every if e.name == term)
     assert effect.in_general == ((name,) if name else ())
     listed = [*CANTILEVER_EFFECTS, *PICTURE_FRAME_EFFECTS]

@@ -866,6 +866,14 @@ def test_laboratories_with_one_way_each_know_no_term(tmp_path):
     assert PictureFrame([laboratory("a", 0.5), laboratory("b", 0.5, 5.0)]).terms
 
 
+@pytest.mark.parametrize(("ends", "there"), [((-0.1, 1.0), True), ((-0.02, 1.0), False)])
+def test_of_shearing_one_way_an_even_moment_is_an_odd_one(ends, there):
+    """And is not offered, as it would have the name of tension_coupling."""
+    names = {term.name for term in terms(RANGES, {"displacement": ends})}
+    assert ("even_moment_of_angle" in names) is there
+    assert "odd_moment_of_angle" in names
+
+
 @pytest.mark.parametrize(("ends", "there"), [((-0.6, 1.0), True), ((-0.1, 1.0), False)])
 def test_one_way_of_shearing_may_have_its_own_moment(ends, there):
     """Where the frame went far to both sides: else it is a moment of the angle like any other."""

@@ -45,6 +45,8 @@ __all__ = ["as_reported", "both_ways", "of_a_law", "ranges_of", "remembering", "
 
 #: As far to either side, as a share of the largest displacement, one of them may have its own.
 SIDE = 0.2
+#: ... and what is even is told from what is odd.
+SLIGHTLY = 0.05
 #: Angles in which a friction begins to slide [rad].
 STICKS = (3e-4, 0.005, 0.03)
 #: Shears in which what rests build is broken, as shares of the largest angle.
@@ -109,7 +111,7 @@ def terms(
     """
     largest = ranges_of(ranges)
     return [
-        *_of_the_crossing(largest),
+        *_of_the_crossing(largest, both_ways(ends, SLIGHTLY)),
         *_of_one_way(largest, both_ways(ends)),
         *_flowing(largest),
         *_lagging(largest),
@@ -133,7 +135,7 @@ def ranges_of(ranges: Mapping[str, float]) -> dict[str, float]:
     return largest | {name: ranges["angle"] for name in ("recent_angle", "recent_largest_angle")}
 
 
-def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
+def _of_the_crossing(largest: Mapping[str, float], both: bool) -> Iterator[Effect]:
     bases: dict[str, tuple[str, ...]] = {
         "elastic": (
             "largest_angle",
@@ -159,7 +161,8 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             *STRUCTURE,
         ),
         "odd": ("angle",),
-        "even": ("angle",),
+        # Of shearing one way an even moment is an odd one.
+        "even": ("angle",) if both else (),
         "odd_in_rate": ("rate",),
         "even_in_rate": ("rate",),
         "outward": ("rate",),
@@ -186,14 +189,15 @@ def _of_the_crossing(largest: Mapping[str, float]) -> Iterator[Effect]:
             )
 
 
-def both_ways(ends: Ends) -> bool:
+def both_ways(ends: Ends, side: float = SIDE) -> bool:
     """Whether what was read is of shearing both ways.
 
     Args:
         ends: between which shares of their largest sizes variables were.
+        side: share that counts as a way.
     """
     low, high = ends.get("displacement", (0.0, 1.0))
-    return low <= -SIDE and high >= SIDE
+    return low <= -side and high >= side
 
 
 def _of_one_way(largest: Mapping[str, float], both: bool) -> Iterator[Effect]:
