@@ -86,7 +86,8 @@ class Cantilever:
     notes = ()
     one_curve = None
     curves_only = False
-    terms_are_rivals = False
+    # What hangs at the free end, or stiffness along the strip, is near to laws of its curvature.
+    terms_are_rivals = True
     in_copies = True
     settles = False
     # A camera that is turned sees a strip that is tilted, but for how that bends; a picture that is
