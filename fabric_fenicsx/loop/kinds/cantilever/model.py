@@ -90,15 +90,7 @@ class Cantilever:
     terms_are_rivals = True
     in_copies = True
     settles = False
-    # A camera that is turned sees a strip that is tilted, but for how that bends; a picture that is
-    # too large, or larger for some overhangs, a strip that bends more than it does.
-    imitated: Mapping[str, tuple[str, ...]] = MappingProxyType(
-        {
-            "clamp_tilt": ("reading_of_distance",),
-            "nonlinear_bending": ("reading_of_height", "reading_of_length"),
-            "residual_curvature": ("reading_of_height", "reading_of_length"),
-        }
-    )
+    imitated: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
     def __init__(
         self,
