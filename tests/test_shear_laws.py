@@ -213,12 +213,12 @@ def test_dahl_friction():
     )
 
 
-@pytest.mark.parametrize("exponent", [1.3, 2.0, 3.0])
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 1.3, 2.0, 3.0])
 def test_dahl_friction_with_an_exponent(exponent):
     """dM/dγ = k (1 − M sign(γ̇)/m)ⁱ, integrated; at an exponent of nearly 1 what has none says."""
 
     def slope(direction):
-        return lambda x, M: direction * 10.0 * (1.0 - direction * M) ** exponent
+        return lambda x, M: direction * 10.0 * np.maximum(1.0 - direction * M, 0.0) ** exponent
 
     path, expected = [0.05, 0.2, 0.1, -0.3], [0.0]
     for old, new in pairwise([0.0, *path]):
@@ -226,7 +226,7 @@ def test_dahl_friction_with_an_exponent(exponent):
         solved = solve_ivp(way, (0.0, abs(new - old)), expected[-1:], rtol=1e-9, atol=1e-11)
         expected.append(solved.y[0, -1])
     law = DahlPowerFriction(1.0, 0.1, exponent=exponent)
-    assert moments(law, path) == pytest.approx(expected[1:], rel=1e-7)
+    assert moments(law, path) == pytest.approx(expected[1:], rel=1e-5)
     nearly = DahlPowerFriction(1.0, 0.1, 2.0, exponent=1.0 + 1e-6)
     assert moments(nearly, path) == pytest.approx(
         moments(DahlFriction(1.0, 0.1, 2.0), path), rel=1e-4

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
-from pydantic import Field
 from ufl import conditional, exp, ge, max_value, min_value
 
 from ...inputs.parameters import Parameter
@@ -15,7 +14,6 @@ from .shapes import LEAST
 
 __all__ = ["DahlFriction", "DahlPowerFriction", "stick_of_limit_one"]
 
-MoreThanOne = Annotated[float, Field(gt=1.0)]
 #: From little more than that of an exponential approach to the limit, on.
 EXPONENT = Parameter("exponent", (2.0,), 1.02, 4.0, meaning="of what is left to the limit")
 
@@ -65,16 +63,16 @@ class DahlFriction(CoulombFriction):
 
 @dataclass(frozen=True)
 class DahlPowerFriction(DahlFriction):
-    """Dahl's friction with his exponent: dM/dγ = k (1 − M sign(γ̇)/m)ⁱ, i > 1.
+    """Dahl's friction with his exponent: dM/dγ = k (1 − M sign(γ̇)/m)ⁱ.
 
-    The larger i, the longer it takes to slide. With ψ = M²/2k it loses
-    M (1 − (1 − M sign(γ̇)/m)ⁱ) |γ̇| sign(γ̇), which is never negative.
+    The larger i, the longer it takes to slide; where i < 1 it slides after a shear that ends.
+    With ψ = M²/2k it loses M (1 − (1 − M sign(γ̇)/m)ⁱ) γ̇, which is never negative.
 
     Attributes:
         exponent: i [-].
     """
 
-    exponent: Any = number("exponent", "i, of what is left to the limit", MoreThanOne, 2.0)
+    exponent: Any = number("exponent", "i, of what is left to the limit", default=2.0)
 
     law = "dahl_power_friction"
     name = "Dahl exponent friction"
@@ -89,10 +87,12 @@ class DahlPowerFriction(DahlFriction):
 
     def moment(self, at: Crossing) -> Any:
         """±m (1 − u), of u = 1 ∓ M/m exactly: u¹⁻ⁱ grows by (i − 1) k |Δγ|/m."""
+        if self.exponent == 1.0:
+            return super().moment(at)
         limit, i = self.limit_at(at), at.number(self.exponent)
         step = at.number(self.stiffness) * at.change / limit
         sign = conditional(ge(step, 0), 1.0, -1.0)
         # A limit that has fallen cuts it. Of nothing the power has a derivative in i as well.
         left = max_value(1 - sign * at.past("moment") / limit, LEAST)
-        slower = 1 + (i - 1) * left ** (i - 1) * size_of(step)
+        slower = max_value(1 + (i - 1) * left ** (i - 1) * size_of(step), LEAST)
         return sign * limit * (1 - left * slower ** (1 / (1 - i)))
