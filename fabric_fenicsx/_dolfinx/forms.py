@@ -20,6 +20,7 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
+from ..arrays import Array
 from .lanes import COMPILER, Lanes, wide_options
 from .meshes import compiling, local_cells
 from .native import built
@@ -167,13 +168,13 @@ def _cache() -> Path:
     return Path(options()["cache_dir"])
 
 
-def add_vector(array: npt.NDArray[np.float64], form: Any) -> None:
+def add_vector(array: Array, form: Any) -> None:
     """Add a linear form to an array over this rank's own and ghost dofs."""
     for part in form:
         _add_part(array, part)
 
 
-def _add_part(array: npt.NDArray[np.float64], part: _Part, packed: Any = None) -> None:
+def _add_part(array: Array, part: _Part, packed: Any = None) -> None:
     if part.lanes is None:
         fem.assemble_vector(array, part.form, coeffs=packed)
     else:
@@ -181,7 +182,7 @@ def _add_part(array: npt.NDArray[np.float64], part: _Part, packed: Any = None) -
         part.lanes.add(_constants(part), part.rows, array)
 
 
-def _constants(part: _Part) -> npt.NDArray[np.float64]:
+def _constants(part: _Part) -> Array:
     return np.asarray(dolfinx.cpp.fem.pack_constants(getattr(part.form, "_cpp_object", part.form)))
 
 
@@ -206,7 +207,7 @@ def has_blocks(form: Any) -> bool:
     return all(part.lanes is not None for part in form)
 
 
-def add_blocks(blocks: npt.NDArray[np.float64], form: Any, places: npt.NDArray[np.int32]) -> None:
+def add_blocks(blocks: Array, form: Any, places: npt.NDArray[np.int32]) -> None:
     """Add a bilinear form, compiled wide, to blocks of a matrix, (n_blocks, n, n), each by columns.
 
     Args:
@@ -231,7 +232,7 @@ def pack(form: Any) -> list[Any]:
     ]
 
 
-def cell_sums(form: Any, space: Any, packed: list[Any] | None = None) -> npt.NDArray[np.float64]:
+def cell_sums(form: Any, space: Any, packed: list[Any] | None = None) -> Array:
     """Sum over this rank's own cells of a linear form over constants per cell.
 
     Args:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array
 from ..processor import abilities
 from .native import built
 
@@ -46,7 +47,7 @@ class Coefficient:
         size: numbers of each dof.
     """
 
-    values: npt.NDArray[np.float64]
+    values: Array
     table: npt.NDArray[np.int32]
     size: int
 
@@ -77,9 +78,9 @@ class Lanes:
 
     def add(
         self,
-        constants: npt.NDArray[np.float64],
+        constants: Array,
         to: npt.NDArray[np.int32],
-        array: npt.NDArray[np.float64],
+        array: Array,
     ) -> None:
         """Add the results of all cells to an array.
 

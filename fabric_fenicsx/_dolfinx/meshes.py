@@ -20,6 +20,8 @@ import ufl
 from dolfinx import fem
 from dolfinx.mesh import GhostMode, create_mesh
 
+from ..arrays import Array, Integers
+
 _BASIX_UFL = hasattr(ufl, "__version__") and not hasattr(ufl, "FiniteElement")
 
 # Seconds that this process has spent in the form compiler, for the run's report.
@@ -40,9 +42,9 @@ def compiling() -> Iterator[None]:
 
 def interval_mesh(
     comm: MPI.Comm,
-    points: npt.NDArray[np.float64],
-    cells: npt.NDArray[np.int64],
-    owners: npt.NDArray[np.int64] | None = None,
+    points: Array,
+    cells: Integers,
+    owners: Integers | None = None,
 ) -> Any:
     """A mesh of two-node intervals, of which each rank gives a part.
 
@@ -90,7 +92,7 @@ def interval_mesh(
 
 
 def _with_ghosts(
-    cells: npt.NDArray[np.int64], owners: npt.NDArray[np.int64], rank: int
+    cells: Integers, owners: Integers, rank: int
 ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
     """Ranks that need each cell of one, its owner first, and where those of each cell begin.
 
@@ -161,7 +163,7 @@ def rows_of_cells(mesh: Any, table: Any, width: int) -> npt.NDArray[np.int32]:
     return array.reshape(local_cells(mesh), width)
 
 
-def cell_dofs(space: Any) -> npt.NDArray[np.int64]:
+def cell_dofs(space: Any) -> Integers:
     """Local block number of each cell's dofs, shape (n_local_cells, dofs_per_cell)."""
     dofmap = space.dofmap
     table = rows_of_cells(space.mesh, dofmap.list, dofmap.dof_layout.num_dofs)
@@ -174,13 +176,13 @@ def local_cells(mesh: Any) -> int:
     return int(cells.size_local + cells.num_ghosts)
 
 
-def input_nodes(mesh: Any) -> npt.NDArray[np.int64]:
+def input_nodes(mesh: Any) -> Integers:
     """Node numbers, as given to interval_mesh, of each local cell, shape (n_local_cells, 2)."""
     local = rows_of_cells(mesh, nodes_of_cells(mesh), 2).astype(np.int64)
     return np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)[local]
 
 
-def input_cells(mesh: Any) -> npt.NDArray[np.int64]:
+def input_cells(mesh: Any) -> Integers:
     """Number of each local cell among those that interval_mesh was given, (n_local_cells,).
 
     The ranks' own cells count one after the other.

@@ -27,9 +27,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..arrays import Array
+from ..arrays import Array, Integers
 from .layout import TowFamily, TowLayout
 from .outline import Polygon, rectangle
 from .paths import ROUNDING, check_size
@@ -126,7 +125,7 @@ class BiasStrip:
         """Of the strip across its warp and across its weft [mm]."""
         return [float(np.ptp(self.outline.extent(axis))) for axis in self.tows]
 
-    def gripped(self, points: Array) -> npt.NDArray[np.int64]:
+    def gripped(self, points: Array) -> Integers:
         """How many of the two tows of a place end in a clamp: 0 in zone A, 1 in B, 2 in C, (n,).
 
         Args:

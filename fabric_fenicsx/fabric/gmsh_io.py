@@ -24,7 +24,7 @@ from fabric_fenicsx.fabric.chains import net_from_lines, place
 from fabric_fenicsx.fabric.net import WARP, WEFT, Net
 from fabric_fenicsx.fabric.paths import TowPaths, is_straight, straight_lines
 
-from ..arrays import Integers
+from ..arrays import Array, Integers
 
 __all__ = ["GROUPS", "load_gmsh", "mesh_net", "read_msh", "write_msh"]
 
@@ -239,7 +239,7 @@ def _group_cells(gmsh: Any, path: Path, name: str, entities: Integers) -> Intege
     return cells.reshape(-1, nodes_per_cell) if dim == 1 else cells
 
 
-def _places(points: npt.NDArray[np.float64]) -> str:
+def _places(points: Array) -> str:
     shown = ", ".join(place(point) for point in points[:3])
     return shown if len(points) <= 3 else f"{shown} and {len(points) - 3} more"
 

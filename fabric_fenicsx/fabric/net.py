@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
+
+from ..arrays import Array, Integers
 
 __all__ = ["WARP", "WEFT", "Net", "Where", "single_tow"]
 
@@ -40,13 +41,13 @@ class Net:
         ValueError: the arrays contradict each other.
     """
 
-    points: npt.NDArray[np.float64]
-    cells: npt.NDArray[np.int64]
-    cell_tow: npt.NDArray[np.int64]
-    tow_family: npt.NDArray[np.int64]
-    crossings: npt.NDArray[np.int64]
-    ends: npt.NDArray[np.int64]
-    normals: npt.NDArray[np.float64]
+    points: Array
+    cells: Integers
+    cell_tow: Integers
+    tow_family: Integers
+    crossings: Integers
+    ends: Integers
+    normals: Array
 
     def __post_init__(self) -> None:
         n, m, tows = len(self.points), len(self.cells), len(self.tow_family)
@@ -77,7 +78,7 @@ class Net:
             raise ValueError("net: a sheet normal is not perpendicular to its tow")
 
     @property
-    def numbers(self) -> dict[Where, npt.NDArray[np.int64]]:
+    def numbers(self) -> dict[Where, Integers]:
         """Numbers of its nodes, cells and crossings; of a part those of the whole, see Part."""
         return {where: np.arange(size) for where, size in self.sizes.items()}
 
@@ -91,33 +92,31 @@ class Net:
         }
 
     @property
-    def lengths(self) -> npt.NDArray[np.float64]:
+    def lengths(self) -> Array:
         """Cell lengths [mm], shape (n_cells,)."""
         return np.linalg.norm(self.points[self.cells[:, 1]] - self.points[self.cells[:, 0]], axis=1)
 
     @property
-    def tangents(self) -> npt.NDArray[np.float64]:
+    def tangents(self) -> Array:
         """Unit tangents along the tows, shape (n_cells, 3)."""
         chords = self.points[self.cells[:, 1]] - self.points[self.cells[:, 0]]
         return chords / self.lengths[:, None]
 
     @property
-    def node_family(self) -> npt.NDArray[np.int64]:
+    def node_family(self) -> Integers:
         """WARP or WEFT for each node, shape (n_nodes,)."""
         family = np.zeros(len(self.points), dtype=np.int64)
         family[self.cells.ravel()] = np.repeat(self.tow_family[self.cell_tow], 2)
         return family
 
     @property
-    def node_lengths(self) -> npt.NDArray[np.float64]:
+    def node_lengths(self) -> Array:
         """Tow length that each node stands for [mm]: half of each cell it ends, (n_nodes,)."""
         halves = np.repeat(self.lengths / 2.0, 2)
         return np.asarray(np.bincount(self.cells.ravel(), halves, len(self.points)), float)
 
 
-def single_tow(
-    points: npt.NDArray[np.float64], normals: npt.NDArray[np.float64] | tuple[float, float, float]
-) -> Net:
+def single_tow(points: Array, normals: Array | tuple[float, float, float]) -> Net:
     """A net of one tow through the given points, without crossings.
 
     Args:

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from ..arrays import Integers
+from ..arrays import Flags, Integers
 from .axes import REACH
 from .crossings import node_tows, tow_numbers
 from .net import Net, Where
@@ -140,7 +139,7 @@ def parts(net: Net, ranks: Integers, count: int) -> Iterator[Part]:
         yield replace(part, ranks=ranks[cells], tow_numbers=numbers)
 
 
-def _widened(chosen: npt.NDArray[np.bool_], line: Integers) -> npt.NDArray[np.bool_]:
+def _widened(chosen: Flags, line: Integers) -> Flags:
     """Chosen ones in a sequence and those up to REACH places from them on the same line."""
     wide = chosen.copy()
     for step in range(1, REACH + 1):

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from ..arrays import Array, Integers
 from .net import WARP, WEFT
@@ -113,9 +112,7 @@ def straight_lines(fabric: TowPaths) -> tuple[Array, Integers, Integers]:
     return np.concatenate(points), lines[0], lines[1]
 
 
-def divide(
-    stations: Array, crossings: Array, spacing: float, subdivisions: int
-) -> npt.NDArray[np.int64]:
+def divide(stations: Array, crossings: Array, spacing: float, subdivisions: int) -> Integers:
     """Cells in each piece of a tow: a fixed number between crossings, as fine beyond them.
 
     Args:

@@ -29,7 +29,8 @@ from dataclasses import dataclass, fields
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
+
+from ..arrays import Array
 
 __all__ = ["BundleSection", "CoupledSection", "FabricSection", "RectangularSection", "Section"]
 
@@ -50,7 +51,7 @@ def rectangle_torsion(width: float, height: float) -> float:
 class Section(Protocol):
     """What a model needs of a section."""
 
-    def stiffness(self) -> npt.NDArray[np.float64]:
+    def stiffness(self) -> Array:
         """Stiffness at zero strain, (N, M) per (Γ, K) [N, N mm, N mm²].
 
         The diagonal, shape (6,), or the whole symmetric matrix, shape (6, 6). In the order
@@ -58,7 +59,7 @@ class Section(Protocol):
         """
         ...
 
-    def mass(self) -> npt.NDArray[np.float64]:
+    def mass(self) -> Array:
         """Mass [tonne/mm] and rotary inertia about the three directors [tonne mm], shape (4,)."""
         ...
 
@@ -118,14 +119,14 @@ class RectangularSection:
         """J [mm⁴]."""
         return rectangle_torsion(self.width, self.height)
 
-    def stiffness(self) -> npt.NDArray[np.float64]:
+    def stiffness(self) -> Array:
         """(EA, κGA, κGA, GJ, E I_out, E I_in) [N, N mm²]: out of the sheet, then in its plane."""
         a, b, E, G = self.width, self.height, self.youngs_modulus, self.shear_modulus
         shear = self.shear_correction * G * self.area
         bending = (E * a * b**3 / 12.0, E * b * a**3 / 12.0)
         return np.array([E * self.area, shear, shear, G * self.torsion_constant, *bending])
 
-    def mass(self) -> npt.NDArray[np.float64]:
+    def mass(self) -> Array:
         """Mass ρA [tonne/mm] and rotary inertia about the three directors [tonne mm]."""
         a, b = self.width, self.height
         out, inside = a * b**3 / 12.0, b * a**3 / 12.0
@@ -176,7 +177,7 @@ class BundleSection:
         """A = n π d²/4 of the filaments [mm²]."""
         return self.filaments * math.pi * self.diameter**2 / 4.0
 
-    def stiffness(self) -> npt.NDArray[np.float64]:
+    def stiffness(self) -> Array:
         """(EA, κGA, κGA, GJ, E I_out, E I_in) [N, N mm²]."""
         E, G, A, d = self.modulus, self.shear_modulus, self.area, self.diameter
         c_in, c_out, c_twist = self.coupling
@@ -189,7 +190,7 @@ class BundleSection:
         ]
         return np.array([E * A, shear, shear, G * A * (d**2 / 8.0 + c_twist * bar), *bent])
 
-    def mass(self) -> npt.NDArray[np.float64]:
+    def mass(self) -> Array:
         """Mass ρA [tonne/mm] and rotary inertia of the rectangle [tonne mm]."""
         line = self.density * self.area
         out, inside = line * self.height**2 / 12.0, line * self.width**2 / 12.0
@@ -223,7 +224,7 @@ class FabricSection:
         if self.base.stiffness().ndim != 1:
             raise ValueError("section: only one without coupling has stiffnesses of its own")
 
-    def stiffness(self) -> npt.NDArray[np.float64]:
+    def stiffness(self) -> Array:
         """(EA, κGA, κGA, GJ, E I_out, E I_in) [N, N mm²]."""
         own = self.base.stiffness() * (self.width / self.base_width)
         stretch, shear, twist, out, inside = self.per_width
@@ -232,7 +233,7 @@ class FabricSection:
                 own[place] = value * self.width
         return own
 
-    def mass(self) -> npt.NDArray[np.float64]:
+    def mass(self) -> Array:
         """That of the base, per width."""
         return self.base.mass() * (self.width / self.base_width)
 
@@ -289,12 +290,12 @@ class CoupledSection:
                 f"smallest eigenvalue is {least:.3g}"
             )
 
-    def stiffness(self) -> npt.NDArray[np.float64]:
+    def stiffness(self) -> Array:
         """The matrix, made exactly symmetric; its diagonal alone if it has nothing else."""
         C = np.array(self.matrix, dtype=float)
         C = (C + C.T) / 2.0
         return C.diagonal().copy() if np.array_equal(C, np.diag(C.diagonal())) else C
 
-    def mass(self) -> npt.NDArray[np.float64]:
+    def mass(self) -> Array:
         """Mass per length and rotary inertia."""
         return np.array(self.masses, dtype=float)

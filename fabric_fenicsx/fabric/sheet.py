@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from math import floor, isfinite
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.fabric.net import WARP, WEFT
 from fabric_fenicsx.fabric.paths import MOST_CELLS, ROUNDING, TowPath, check_size, divide
+
+from ..arrays import Array, Integers
 
 __all__ = ["Sheet", "centred_sheet", "spaced_sheet"]
 
@@ -58,11 +59,11 @@ class Sheet:
         if (cells := sum(counts)) > MOST_CELLS:
             raise ValueError(f"sheet: {cells:.1e} cells; at most {MOST_CELLS} are allowed")
 
-    def positions(self, family: int) -> npt.NDArray[np.float64]:
+    def positions(self, family: int) -> Array:
         """Where the tows of WARP or WEFT lie across their own direction [mm], (n_tows,)."""
         return np.array(self.warp_positions if family == WARP else self.weft_positions)
 
-    def stations(self, family: int) -> npt.NDArray[np.float64]:
+    def stations(self, family: int) -> Array:
         """Ends and crossings along a tow of WARP or WEFT [mm], increasing."""
         ends, crossings = (
             (self.y_range, self.weft_positions)
@@ -71,7 +72,7 @@ class Sheet:
         )
         return np.unique(np.concatenate([ends, crossings]))
 
-    def divisions(self, family: int) -> npt.NDArray[np.int64]:
+    def divisions(self, family: int) -> Integers:
         """Cells in each piece between the stations of a tow, shape (n_stations - 1,)."""
         crossings = self.positions(1 - family)
         stations = self.stations(family)

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import map_coordinates, spline_filter
 
-from ..arrays import Array
+from ..arrays import Array, Integers
 from .distance import cubic_basis
 from .triangles import Triangles
 
@@ -171,9 +170,7 @@ def _below(corners: Array, height: float) -> Array:
     return np.asarray(cut.points, dtype=np.float64)[cut.faces.reshape(-1, 4)[:, 1:]]
 
 
-def _whole_numbers(
-    low: Array, high: Array, size: int
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _whole_numbers(low: Array, high: Array, size: int) -> tuple[Integers, Integers]:
     """All whole numbers from 0 below ``size`` in each interval, and which interval each is of."""
     first = np.maximum(np.ceil(low - 1e-9), 0).astype(np.int64)
     last = np.minimum(np.floor(high + 1e-9), size - 1).astype(np.int64)
@@ -219,7 +216,7 @@ def _spanned(upper: Array, lower: Array, axis: Array, flat: float) -> Array:
     return np.where(last < R, np.where(np.isfinite(lower), lower, flat), on_punch)
 
 
-def _steepest(rise: Array, run: Array) -> npt.NDArray[np.int64]:
+def _steepest(rise: Array, run: Array) -> Integers:
     """Where along each row rise/run is largest, among positive runs."""
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = np.where(run > 0.0, rise / run, -np.inf)

@@ -17,10 +17,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import RegularGridInterpolator
 
-from ..arrays import Array
+from ..arrays import Array, Flags
 from .formed import FormedSurface
 
 __all__ = ["KinematicNet", "net_on_surface"]
@@ -51,7 +50,7 @@ class KinematicNet:
     v: Array
     axes: Array
     place: Array
-    sheet: npt.NDArray[np.bool_]
+    sheet: Flags
 
     @property
     def apex(self) -> Array:
@@ -94,7 +93,7 @@ class KinematicNet:
         return max(float(np.nanmax(np.abs(change), initial=0.0)) for change in changes)
 
     @property
-    def ended(self) -> npt.NDArray[np.bool_]:
+    def ended(self) -> Flags:
         """Crossings of the sheet that have no place, shape (n_warp, n_weft)."""
         return self.sheet & np.isnan(self.place[..., 0])
 

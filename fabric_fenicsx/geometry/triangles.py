@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from ..arrays import Array
+from ..arrays import Array, Integers
 from ..errors import InputError
 
 __all__ = ["Triangles", "read_stl", "write_stl"]
@@ -39,7 +38,7 @@ class Triangles:
     """
 
     points: Array
-    cells: npt.NDArray[np.int64]
+    cells: Integers
 
     def __post_init__(self) -> None:
         for name, size in (("points", np.shape(self.points)), ("cells", np.shape(self.cells))):
@@ -81,7 +80,7 @@ class Triangles:
         a, b, c = cells.T
         return cls(flat[first], cells[(a != b) & (b != c) & (c != a)])
 
-    def _directed_edges(self) -> npt.NDArray[np.int64]:
+    def _directed_edges(self) -> Integers:
         return np.concatenate([self.cells[:, [0, 1]], self.cells[:, [1, 2]], self.cells[:, [2, 0]]])
 
     @property

@@ -13,8 +13,8 @@ from pathlib import Path as FilePath
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..geometry.distance import DistanceGrid
 from ..geometry.triangles import Triangles, read_stl
 from .contact import plate_with_hole, sampled_distance, sphere
@@ -46,7 +46,7 @@ class Tool(Protocol):
         """Signed distance [mm] of the position x from the tool, positive outside (UFL)."""
         ...
 
-    def profile(self, extent: float) -> npt.NDArray[np.float64]:
+    def profile(self, extent: float) -> Array:
         """Outline for pictures: radius and height relative to the place [mm], shape (n, 2)."""
         ...
 
@@ -59,9 +59,7 @@ class SampledTool(Tool, Protocol):
     ``mechanics.contact.sampled_distance``.
     """
 
-    def sample(
-        self, x: npt.NDArray[np.float64]
-    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    def sample(self, x: Array) -> tuple[Array, Array, Array]:
         """Distance (n,), gradient (n, 3), second derivatives (n, 3, 3) at x − place, (n, 3)."""
         ...
 
@@ -82,7 +80,7 @@ class Sphere:
         """|x − c| − R."""
         return sphere(x, place, numbers["radius"])
 
-    def profile(self, extent: float) -> npt.NDArray[np.float64]:
+    def profile(self, extent: float) -> Array:
         """The lower half, as a punch shows it."""
         angle = np.linspace(0.0, np.pi / 2.0, 46)
         return self.radius * np.column_stack([np.sin(angle), -np.cos(angle)])
@@ -116,7 +114,7 @@ class HoledPlate:
             x, place, numbers["hole_radius"], numbers["edge_radius"], numbers["side"]
         )
 
-    def profile(self, extent: float) -> npt.NDArray[np.float64]:
+    def profile(self, extent: float) -> Array:
         """From the wall of the hole over the rounding out to ``extent``."""
         angle = np.linspace(0.0, np.pi / 2.0, 19)
         rim = self.hole_radius + self.edge_radius
@@ -179,9 +177,7 @@ class Mould:
         """None: the shape is in the samples."""
         return {}
 
-    def sample(
-        self, x: npt.NDArray[np.float64]
-    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    def sample(self, x: Array) -> tuple[Array, Array, Array]:
         """By the grid's spline."""
         return self.grid.evaluate(x)
 
@@ -189,7 +185,7 @@ class Mould:
         """The quadratic about the nodes' places at this iterate."""
         return sampled_distance(x, numbers["sample"])
 
-    def profile(self, extent: float) -> npt.NDArray[np.float64]:
+    def profile(self, extent: float) -> Array:
         """The widest radius at each height; pictures draw the surface itself, see TriangleSurface.
 
         Points further out than ``extent`` are left out.

@@ -10,12 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.output.draped import DrapedSheet
 from fabric_fenicsx.output.pattern import to_line
 
-from ..arrays import Array
+from ..arrays import Array, Integers
 
 __all__ = ["AngleMap", "compared_angles", "differing_keys", "line_distance", "repeat_scatter"]
 
@@ -103,7 +102,7 @@ def repeat_scatter(table: Mapping[str, Array]) -> float | None:
     return float(np.sqrt(np.mean(known**2))) if len(known) else None
 
 
-def _places(table: Mapping[str, Array]) -> tuple[Array, npt.NDArray[np.int64], Array]:
+def _places(table: Mapping[str, Array]) -> tuple[Array, Integers, Array]:
     """Places (k, d), to which of them each reading belongs, and how many readings each has."""
     at = np.column_stack([table[name] for name in ("x_mm", "y_mm", "z_mm") if name in table])
     _, first, group = np.unique(

@@ -10,7 +10,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
@@ -19,6 +18,8 @@ from fabric_fenicsx.output.lines import COLOURS, scale_limits, tow_lines
 from fabric_fenicsx.output.pictures import colour_map, draw_net
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangles
 from fabric_fenicsx.solving.snapshot import Snapshot
+
+from ..arrays import Array
 
 __all__ = ["encoder", "write_film"]
 
@@ -115,7 +116,7 @@ def write_film(
                 _mp4(program, partial, Path(folder), len(pictures), rate)
 
 
-def _gif(path: Path, pictures: list[Path], rate: float, colours: npt.NDArray[np.float64]) -> None:
+def _gif(path: Path, pictures: list[Path], rate: float, colours: Array) -> None:
     from PIL import Image
 
     images = [Image.open(picture).convert("RGB") for picture in pictures]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 import pyvista as pv
 
+from ..arrays import Array
 from ..geometry.kinematic_net import KinematicNet
 from .canvas import canvas
 from .files import write_text
@@ -69,7 +69,7 @@ def draw_kinematic(
 
 def _tows(net: KinematicNet) -> pv.PolyData:
     """Some tows of both families as lines, the principal ones among them."""
-    segments: list[npt.NDArray[np.float64]] = []
+    segments: list[Array] = []
     kept = net.sheet & ~np.isnan(net.shear)
     for axis, stations in ((0, net.u), (1, net.v)):
         middle = int(np.flatnonzero(stations == 0.0)[0])

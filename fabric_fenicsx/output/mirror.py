@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.solving.snapshot import Snapshot
 
-from ..arrays import Array, Integers
+from ..arrays import Array, Flags, Integers
 
 __all__ = ["whole_sheet"]
 
@@ -143,7 +142,7 @@ def _renumbered(net: Net, snapshot: Snapshot) -> tuple[Net, Snapshot]:
     return renumbered, state
 
 
-def _rank(copied: Integers, backwards: npt.NDArray[np.bool_]) -> Integers:
+def _rank(copied: Integers, backwards: Flags) -> Integers:
     """Order of the copied cells among themselves: backwards where the tow is run through so."""
     return np.where(backwards, -1 - copied, copied)
 
@@ -160,8 +159,8 @@ def _along_tows(cells: Integers, cell_tow: Integers, rank: Integers) -> Integers
 
 
 def _image_signs(
-    mirrored: npt.NDArray[np.bool_],
-    turned: npt.NDArray[np.bool_],
+    mirrored: Flags,
+    turned: Flags,
     *,
     kept: tuple[int, int, int],
     reversed_: tuple[int, int, int],

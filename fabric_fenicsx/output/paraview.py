@@ -16,13 +16,14 @@ from types import MappingProxyType
 from xml.etree import ElementTree as ET
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
 from fabric_fenicsx.output.files import write_bytes, write_text
 from fabric_fenicsx.output.vtk_xml import Packed, packed, parallel_file, xml_file
 from fabric_fenicsx.solving.snapshot import Snapshot
+
+from ..arrays import Array, Integers
 
 __all__ = ["TimeSeries"]
 
@@ -127,7 +128,7 @@ class TimeSeries:
     def add(
         self,
         snapshot: Snapshot,
-        places: Mapping[str, npt.NDArray[np.float64]] = MappingProxyType({}),
+        places: Mapping[str, Array] = MappingProxyType({}),
     ) -> None:
         """Write one step and name it in the collections.
 
@@ -240,9 +241,7 @@ class _Grid:
         kind: VTK's number of their shape.
     """
 
-    def __init__(
-        self, points: npt.NDArray[np.float64], cells: npt.NDArray[np.int64], kind: int
-    ) -> None:
+    def __init__(self, points: Array, cells: Integers, kind: int) -> None:
         count, size = cells.shape
         self._counts = {"NumberOfPoints": len(points), "NumberOfCells": count}
         ends = size * np.arange(1, count + 1)
@@ -271,11 +270,11 @@ class _Grid:
         return parallel_file("UnstructuredGrid", {**data, **self._sections}, pieces)
 
 
-def _named(**arrays: npt.NDArray[np.float64]) -> dict[str, Packed]:
+def _named(**arrays: Array) -> dict[str, Packed]:
     return {name: packed(values, COMPONENTS.get(name, ())) for name, values in arrays.items()}
 
 
-def _at_nodes(snapshot: Snapshot, nodes: npt.NDArray[np.int64]) -> dict[str, Packed]:
+def _at_nodes(snapshot: Snapshot, nodes: Integers) -> dict[str, Packed]:
     directors = {f"d{i + 1}": snapshot.directors[nodes, i] for i in range(3)}
     return _named(
         displacement=snapshot.displacement[nodes],

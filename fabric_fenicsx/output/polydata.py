@@ -11,10 +11,12 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 
+from ..arrays import Array, Integers
+
 __all__ = ["poly_data"]
 
 
-def _cells(sizes: npt.NDArray[np.int64], corners: npt.NDArray[np.int64]) -> vtkCellArray:
+def _cells(sizes: Integers, corners: Integers) -> vtkCellArray:
     """Cells of ``sizes`` points each, (m,), whose points stand one after the other."""
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     numbers = np.ascontiguousarray(corners, dtype=np.int64).ravel()
@@ -26,9 +28,9 @@ def _cells(sizes: npt.NDArray[np.int64], corners: npt.NDArray[np.int64]) -> vtkC
 
 
 def poly_data(
-    points: npt.NDArray[np.float64],
+    points: Array,
     *,
-    faces: npt.NDArray[np.int64] | None = None,
+    faces: Integers | None = None,
     lines: Sequence[int] | None = None,
     values: Mapping[str, npt.NDArray[Any]] | None = None,
 ) -> vtkPolyData:

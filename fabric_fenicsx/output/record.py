@@ -21,8 +21,8 @@ from zipfile import BadZipFile
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array, Integers
 from ..errors import InputError
 from ..fabric.net import Net, Where
 from ..parallel import from_root
@@ -102,7 +102,7 @@ class Record:
         self._root = model.comm.rank == 0
         self._columns: list[str] = []
         # The step that was looked at last, and where the tools are in it.
-        self._seen: tuple[Snapshot, dict[str, npt.NDArray[np.float64]]]
+        self._seen: tuple[Snapshot, dict[str, Array]]
         until = math.inf if resume_at is None else resume_at * (1.0 + 1e-12)
         net = model.disc.whole_net(to=0)
         if net is not None and self._root:
@@ -240,7 +240,7 @@ class Record:
             else:
                 rows[where][name] = values[owned] if where == "nodes" else values
         self._series.add(snapshot, places)
-        numbers: dict[Where, npt.NDArray[np.int64]] = {
+        numbers: dict[Where, Integers] = {
             where: np.sort(own) for where, own in disc.numbers.items()
         }
         comm = model.comm
@@ -306,16 +306,14 @@ def _load(file: StepFile, path: Path, stepper: Stepper) -> None:
         raise KeyError(f"{', '.join(sorted(missing))} missing")
     sizes = disc.net.sizes
 
-    def of_nodes(name: str, nodes: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+    def of_nodes(name: str, nodes: Integers) -> Array:
         rows, shape = file.rows(name, nodes, sizes["nodes"])
         wanted = sizes["nodes"], STATE[name]
         if shape != wanted:
             raise InputError(f"{path}: {name} has shape {shape}; that of this net is {wanted}")
         return rows
 
-    def remembered(
-        name: str, where: Where, numbers: npt.NDArray[np.int64]
-    ) -> npt.NDArray[np.float64]:
+    def remembered(name: str, where: Where, numbers: Integers) -> Array:
         rows, shape = file.rows(HISTORY + name, numbers, sizes[where])
         if shape[0] != sizes[where]:
             raise IndexError

@@ -11,7 +11,6 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.errors import InputError
 from fabric_fenicsx.fabric.net import Net
@@ -27,6 +26,8 @@ from fabric_fenicsx.output.surfaces import (
 )
 from fabric_fenicsx.output.vtk_xml import packed, xml_file
 from fabric_fenicsx.solving.snapshot import Snapshot
+
+from ..arrays import Array, Integers
 
 __all__ = ["Results", "read_net", "read_results", "seen_arrays", "write_setup"]
 
@@ -136,7 +137,7 @@ def write_setup(
         write_bytes(shapes / f"{tool.name}.vtp", _triangles_file(points, cells))
 
 
-def _triangles_file(points: npt.NDArray[np.float64], cells: npt.NDArray[np.int64]) -> list[bytes]:
+def _triangles_file(points: Array, cells: Integers) -> list[bytes]:
     """Triangles as VTK's XML file of polygons."""
     ends = 3 * np.arange(1, len(cells) + 1)
     faces = {"connectivity": np.asarray(cells, dtype=np.int64).ravel(), "offsets": ends}
@@ -186,9 +187,7 @@ def read_results(folder: Path | str) -> Results:
     return Results(folder, net, tools, steps)
 
 
-def seen_arrays(
-    snapshot: Snapshot, places: Mapping[str, npt.NDArray[np.float64]]
-) -> dict[str, npt.NDArray[np.float64]]:
+def seen_arrays(snapshot: Snapshot, places: Mapping[str, Array]) -> dict[str, Array]:
     """What a step file has beside the state to go on from, for those who look at a run.
 
     Args:
@@ -199,7 +198,7 @@ def seen_arrays(
     return arrays | {f"place: {name}": place for name, place in places.items()}
 
 
-def _read_step(path: Path, net: Net) -> tuple[Snapshot, dict[str, npt.NDArray[np.float64]]]:
+def _read_step(path: Path, net: Net) -> tuple[Snapshot, dict[str, Array]]:
     """A step's snapshot and where each tool was [mm], by name."""
     try:
         with StepFile(path) as file:

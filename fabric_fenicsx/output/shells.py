@@ -19,18 +19,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pyvista as pv
 
 from fabric_fenicsx.fabric.net import WARP, Net
 from fabric_fenicsx.inputs.shell_mesh import ShellMesh
 from fabric_fenicsx.output.fibres import FibreMap
 
-from ..arrays import Array, Integers
+from ..arrays import Array, Flags, Integers
 
 __all__ = ["Placement", "ShellFibres", "flat_fraction", "on_shells", "warp_share"]
 
-Booleans = npt.NDArray[np.bool_]
+Booleans = Flags
 
 SIDES = {"both": 0.0, "front": 1.0, "back": -1.0}
 """Where the normals of elements point, seen from the fabric's."""

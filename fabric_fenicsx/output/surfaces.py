@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+
+from ..arrays import Array, Integers
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -44,8 +45,8 @@ class RevolvedSurface:
     """
 
     name: str
-    profile: npt.NDArray[np.float64]
-    centre: npt.NDArray[np.float64]
+    profile: Array
+    centre: Array
     colour: str = OTHER_COLOUR
     opacity: float = 0.35
 
@@ -77,9 +78,9 @@ class TriangleSurface:
     """
 
     name: str
-    points: npt.NDArray[np.float64]
-    cells: npt.NDArray[np.int64]
-    place: npt.NDArray[np.float64]
+    points: Array
+    cells: Integers
+    place: Array
     colour: str = OTHER_COLOUR
     opacity: float = 0.35
 
@@ -93,9 +94,7 @@ class TriangleSurface:
             raise ValueError(f"surface {self.name}: place has shape {shape}, not (3,)")
 
 
-def tool_surface(
-    tool: Tool, extent: float, place: npt.NDArray[np.float64]
-) -> RevolvedSurface | TriangleSurface:
+def tool_surface(tool: Tool, extent: float, place: Array) -> RevolvedSurface | TriangleSurface:
     """What pictures show of a tool.
 
     Args:
@@ -115,7 +114,7 @@ def tool_surface(
 
 def triangles(
     surface: RevolvedSurface | TriangleSurface,
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+) -> tuple[Array, Integers]:
     """The surface in its place: points [mm], shape (n, 3), and triangles, shape (m, 3)."""
     if isinstance(surface, RevolvedSurface):
         return _revolved(surface)
@@ -130,9 +129,7 @@ def triangulated(surface: RevolvedSurface | TriangleSurface) -> pv.PolyData:
     return pv.PolyData(points, faces=np.insert(cells, 0, 3, axis=1).ravel())
 
 
-def _revolved(
-    surface: RevolvedSurface, pieces: int = 180
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+def _revolved(surface: RevolvedSurface, pieces: int = 180) -> tuple[Array, Integers]:
     """Points and triangles of a turned profile, closed around the axis and at its poles."""
     profile = np.asarray(surface.profile, dtype=np.float64)
     same = 1e-9 * float(np.abs(profile).max())

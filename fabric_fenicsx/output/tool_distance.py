@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pyvista as pv
 
 from fabric_fenicsx.output.surfaces import TriangleSurface, triangulated
 
-from ..arrays import Array, Integers
+from ..arrays import Array, Flags, Integers
 
 __all__ = ["ToolDistance", "deepest_penetration", "tool_distance"]
 
@@ -70,7 +69,7 @@ def _to_tool(tool: TriangleSurface, points: Array) -> tuple[Array, Array]:
     return np.asarray(feet), distance * np.sign(facing * signed)
 
 
-def _on_rim(mesh: Any, feet: Array) -> npt.NDArray[np.bool_]:
+def _on_rim(mesh: Any, feet: Array) -> Flags:
     """Whether points of a surface lie on edges that belong to one triangle only."""
     rim = mesh.extract_feature_edges(
         boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False

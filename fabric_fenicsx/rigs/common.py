@@ -14,6 +14,7 @@ from mpi4py import MPI
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array, Integers
 from ..errors import InputError
 from ..fabric.crossings import tow_numbers
 from ..fabric.gmsh_io import mesh_net, read_msh
@@ -133,7 +134,7 @@ def _bundle(keys: BundleKeys, shear_correction: float) -> BundleSection:
 
 def tow_sections(
     case: Case, net: Net, spacings: tuple[float, float]
-) -> tuple[tuple[Section, ...], npt.NDArray[np.int64]]:
+) -> tuple[tuple[Section, ...], Integers]:
     """The sections of a case's tows, and which of them each tow of the net has, (n_tows,).
 
     Args:
@@ -348,6 +349,6 @@ def extend(summary: dict[str, Any], quantities: dict[str, Any], session: Session
     return {**summary, "seconds": seconds, "quantities": quantities}
 
 
-def lowest(net: Net, u: npt.NDArray[np.float64]) -> float:
+def lowest(net: Net, u: Array) -> float:
     """Lowest point of the deformed net [mm]."""
     return float((net.points + u)[:, 2].min())

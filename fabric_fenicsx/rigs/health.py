@@ -10,10 +10,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import Delaunay, QhullError
 
-from ..arrays import Array
+from ..arrays import Array, Flags
 from ..fabric.crossings import crossings_by_tow
 from ..fabric.net import WARP, Net
 from ..mechanics.contact import LIMIT
@@ -291,7 +290,7 @@ def _distance(
     return figures, said
 
 
-def _within(points: Array, corners: Array) -> npt.NDArray[np.bool_]:
+def _within(points: Array, corners: Array) -> Flags:
     """Which points of the plane lie in the convex hull of others, (n,)."""
     try:
         return np.asarray(Delaunay(corners).find_simplex(points) >= 0)

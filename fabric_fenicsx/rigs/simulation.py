@@ -8,10 +8,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from .. import _dolfinx
+from ..arrays import Array
 from ..errors import InputError, SolveError
 from ..output.folder import prepare_folder
 from ..output.record import Record, load_state
@@ -42,7 +40,7 @@ class Run:
     stop: str | None
     rows: list[dict[str, float]]
     last: Snapshot | None
-    gaps: dict[str, npt.NDArray[np.float64]]
+    gaps: dict[str, Array]
     summary: dict[str, Any]
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from ..arrays import Array
 from ..errors import InputError
 from ..fabric.crossings import areas, crossing_numbers
 from ..fabric.layout import TowLayout, spaced_layout
@@ -118,7 +117,7 @@ def layout(keys: WeaveKeys, sheet: SheetKeys, *, quarter: bool, base: Path = Pat
 
 def crossing_weights(
     keys: WeaveKeys, sheet: SheetKeys, net: Net, base: Path = Path()
-) -> dict[str, npt.NDArray[np.float64]]:
+) -> dict[str, Array]:
     """Factors on the in-plane moments of each crossing, for `Model(**...)`.
 
     Returns:

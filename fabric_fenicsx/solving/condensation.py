@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..arrays import Array, Integers
+from ..arrays import Array, Flags, Integers
 from ..fabric.net import Net
 from .blocks import BLOCK
 from .discretisation import Discretisation
@@ -29,7 +28,7 @@ GROWTH = 1e3
 _TYPES = {"f8": "double[]", "i8": "int64_t[]", "i4": "int32_t[]", "i1": "int8_t[]"}
 
 
-def inner_nodes(disc: Discretisation) -> npt.NDArray[np.bool_]:
+def inner_nodes(disc: Discretisation) -> Flags:
     """This rank's own nodes whose equations have two neighbours and are all on it.
 
     Neither crossings nor ends of tows, and neither they nor their neighbours at a rank's edge.
@@ -73,7 +72,7 @@ class Runs:
         self.last = (place == count[:, None] - 1)[there]
 
     @classmethod
-    def of(cls, net: Net, inner: npt.NDArray[np.bool_]) -> Runs:
+    def of(cls, net: Net, inner: Flags) -> Runs:
         """All runs of a net whose inner nodes are given, (n_nodes,), none the end of a tow."""
         after, before = (np.full(len(net.points), -1) for _ in range(2))
         after[net.cells[:, 0]], before[net.cells[:, 1]] = net.cells[:, 1], net.cells[:, 0]
@@ -88,7 +87,7 @@ class Runs:
         """Nodes a and b of each run, (n_runs, 2)."""
         return np.column_stack([self.nodes[self.first], self.nodes[self.last]])
 
-    def only(self, chosen: npt.NDArray[np.bool_]) -> Runs:
+    def only(self, chosen: Flags) -> Runs:
         """Some of the runs."""
         return Runs(self._table[chosen])
 
@@ -109,7 +108,7 @@ class Blocks:
         self._symmetric = symmetric
         self._keys = np.unique(self._key(rows, columns)[0])
 
-    def _key(self, rows: Integers, columns: Integers) -> tuple[Integers, npt.NDArray[np.bool_]]:
+    def _key(self, rows: Integers, columns: Integers) -> tuple[Integers, Flags]:
         below = (rows > columns) & self._symmetric
         i, j = np.where(below, columns, rows), np.where(below, rows, columns)
         # Of 64 bits: the number of pairs of a large net's nodes does not fit into 32.
@@ -183,7 +182,7 @@ class Elimination:
         C, L = (None, None) if symmetric else (np.zeros_like(D), np.zeros_like(D))
         self._factors = (D, np.zeros((count, BLOCK), dtype=np.int32), Y, Z, C, L)
 
-    def eliminate(self, values: Array, free: Array) -> npt.NDArray[np.bool_]:
+    def eliminate(self, values: Array, free: Array) -> Flags:
         """Put into ``left`` what the elimination leaves.
 
         Args:

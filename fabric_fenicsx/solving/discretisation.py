@@ -17,11 +17,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
-import numpy.typing as npt
 
 from .. import _dolfinx
 from .._dolfinx import Function
-from ..arrays import Array
+from ..arrays import Array, Integers
 from ..fabric.crossings import at_nodes, reference_angle, unit
 from ..fabric.net import Net, Where
 from ..fabric.part import Part
@@ -143,7 +142,7 @@ class Discretisation:
         mine = (warp_block >= first) & (warp_block < first + self.owned)
         self.crossing_places = np.flatnonzero(mine)
 
-    def _number_cells(self, mesh: Any, nodes: npt.NDArray[np.int64]) -> None:
+    def _number_cells(self, mesh: Any, nodes: Integers) -> None:
         """Find the local cells, whose nodes are given by the net's numbers, (n, 2)."""
         net, comm = self.net, self.comm
         given = np.flatnonzero(net.ranks == comm.rank)
@@ -306,24 +305,24 @@ class Discretisation:
         return block_matrix(comm, self.own_pairs, len(self.own_blocks), symmetric=symmetric)
 
     @cached_property
-    def own_blocks(self) -> npt.NDArray[np.int64]:
+    def own_blocks(self) -> Integers:
         """Global blocks that this rank adds to: its local ones, then connectors' other ends."""
         others = np.setdiff1d(self.connector_blocks, self.global_blocks)
         return np.concatenate([self.global_blocks, others]).astype(np.int64)
 
     @cached_property
-    def own_vertices(self) -> npt.NDArray[np.int64]:
+    def own_vertices(self) -> Integers:
         """Places in ``own_blocks`` of the connectors' vertices, as ``connector_blocks``."""
         order = np.argsort(self.own_blocks)
         return order[np.searchsorted(self.own_blocks, self.connector_blocks, sorter=order)]
 
     @cached_property
-    def own_pairs(self) -> npt.NDArray[np.int64]:
+    def own_pairs(self) -> Integers:
         """Both ends of this rank's cells and connectors as places in ``own_blocks``, (n, 2)."""
         return np.vstack(list(self.pairs_by_mesh.values()))
 
     @property
-    def pairs_by_mesh(self) -> dict[str, npt.NDArray[np.int64]]:
+    def pairs_by_mesh(self) -> dict[str, Integers]:
         """The same of each mesh, in the order of its cells."""
         pairs = {"tows": _dolfinx.cell_dofs(self.tows.space)[: self._owned_cells]}
         if self.connectors is not None:
@@ -402,13 +401,13 @@ class Discretisation:
         return self._gathers[where](local, to=to)
 
     @cached_property
-    def numbers(self) -> dict[Where, npt.NDArray[np.int64]]:
+    def numbers(self) -> dict[Where, Integers]:
         """Net's numbers of the nodes, cells and crossings that this rank owns."""
         whole = self.net.numbers
         return {where: whole[where][places] for where, places in self._own.items()}
 
     @property
-    def _own(self) -> dict[Where, npt.NDArray[np.int64]]:
+    def _own(self) -> dict[Where, Integers]:
         """Places in ``net`` of what this rank owns."""
         return {
             "nodes": self.places[: self.owned],

@@ -10,10 +10,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from .. import _dolfinx
-from ..arrays import Array
+from ..arrays import Array, Integers
 from ..fabric.net import Where
 from ..mechanics import beam, crossover
 from .discretisation import Discretisation
@@ -148,7 +147,7 @@ class Histories:
     def read(
         self,
         whole: Callable[[str], Array],
-        rows: Callable[[str, Where, npt.NDArray[np.int64]], Array],
+        rows: Callable[[str, Where, Integers], Array],
     ) -> None:
         """Put saved values back, of fields those that this rank needs.
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
-from ..arrays import Array
+from ..arrays import Array, Integers
 from ..fabric.net import Net
 from ..fabric.part import Part
 from ..fabric.section import Section
@@ -54,7 +54,7 @@ class Support:
             to 2; None holds them. Turns (3 to 5) are held.
     """
 
-    nodes: npt.NDArray[np.int64]
+    nodes: Integers
     components: tuple[int, ...]
     displacement: Callable[[float], Array] | None = None
 
@@ -104,7 +104,7 @@ class Model:
         net: Net,
         section: Section | tuple[Section, ...],
         *,
-        tow_section: npt.NDArray[np.int64] | None = None,
+        tow_section: Integers | None = None,
         section_law: SectionLawName = "linear",
         bending: Bending = STRAIGHT,
         uncrimping: Uncrimping | None = None,
@@ -385,7 +385,7 @@ class Model:
         self.system.residual(F)
         return np.array(F.array_r).reshape(-1, BLOCK)
 
-    def reactions_at(self, nodes: npt.NDArray[np.int64]) -> Array:
+    def reactions_at(self, nodes: Integers) -> Array:
         """The same at some nodes, by the net's numbers; 0 at those that are another rank's.
 
         Collective; which nodes is for each rank to say, as for ``Support``. Returns (n, 6).

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._dolfinx import NOT_A_NUMBER
+from ..arrays import Array
 from ..errors import SolveError
 from .pressed import Dyad, DyadicLU
 from .system import System
@@ -150,7 +151,7 @@ class Newton:
             pc.setPythonContext(DyadicLU(tangent, self._free_dyads))
         return snes
 
-    def solve(self, targets: npt.NDArray[np.float64]) -> Outcome:
+    def solve(self, targets: Array) -> Outcome:
         """Solve for the increment, starting from the values in ``x``.
 
         Args:
@@ -190,7 +191,7 @@ class Newton:
             step=self._step,
         )
 
-    def residual(self, x: PETSc.Vec, F: PETSc.Vec, targets: npt.NDArray[np.float64]) -> None:
+    def residual(self, x: PETSc.Vec, F: PETSc.Vec, targets: Array) -> None:
         """Residual at the increment x, which stands in the fields; prescribed rows miss theirs."""
         self.system.residual(F)
         self.reactions = F.array_r[self._fixed]

@@ -7,9 +7,8 @@ separator, where an algorithm that knows the graph alone finds wider ones.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from ..arrays import Integers
+from ..arrays import Array, Integers
 
 __all__ = ["nested_dissection"]
 
@@ -18,7 +17,7 @@ __all__ = ["nested_dissection"]
 SMALL = 6
 
 
-def nested_dissection(points: npt.NDArray[np.float64], pairs: Integers) -> list[Integers]:
+def nested_dissection(points: Array, pairs: Integers) -> list[Integers]:
     """An order of elimination: both halves of the net first, then what separates them, and so on.
 
     Args:

@@ -8,9 +8,9 @@ from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from .. import _dolfinx
+from ..arrays import Array, Integers
 from ..fabric.section import FabricSection, RectangularSection, Section
 from ..mechanics.bending_laws import BendingLaw, bent_section
 from ..mechanics.neo_hookean import neo_hookean_section
@@ -39,7 +39,7 @@ class Bending:
 STRAIGHT = Bending()
 
 
-def diagonals(sections: Sequence[Section]) -> npt.NDArray[np.float64]:
+def diagonals(sections: Sequence[Section]) -> Array:
     """Diagonal of the stiffness of each section, shape (n, 6) [N, N mm²]."""
     matrices = [s.stiffness() for s in sections]
     return np.array([C if C.ndim == 1 else C.diagonal() for C in matrices])
@@ -48,7 +48,7 @@ def diagonals(sections: Sequence[Section]) -> npt.NDArray[np.float64]:
 def elastic_section(
     disc: Discretisation,
     sections: Sequence[Section],
-    kind: npt.NDArray[np.int64],
+    kind: Integers,
     law: SectionLawName,
     bending: Bending = STRAIGHT,
     uncrimping: Uncrimping | None = None,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..fabric.axes import tow_axes
 from ..fabric.net import Net
 
@@ -40,15 +40,15 @@ class Snapshot:
     """
 
     time: float
-    displacement: npt.NDArray[np.float64]
-    directors: npt.NDArray[np.float64]
-    section_forces: npt.NDArray[np.float64]
-    section_moments: npt.NDArray[np.float64]
-    contact_pressure: npt.NDArray[np.float64]
-    axes: npt.NDArray[np.float64]
-    shear_angle: npt.NDArray[np.float64]
-    director_turn: npt.NDArray[np.float64]
-    crossing_moment: npt.NDArray[np.float64]
+    displacement: Array
+    directors: Array
+    section_forces: Array
+    section_moments: Array
+    contact_pressure: Array
+    axes: Array
+    shear_angle: Array
+    director_turn: Array
+    crossing_moment: Array
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.time):

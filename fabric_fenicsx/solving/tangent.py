@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _dolfinx
+from ..arrays import Array, Flags, Integers
 from .blocks import BLOCK, expand
 from .condensation import Blocks, Elimination, Runs, inner_nodes
 from .direct import destroy, ordering, petsc, solved, solver
@@ -230,7 +231,7 @@ class Condensed:
         # A matrix has its pattern once it has been filled.
         system.tangent(self._A)
         self._places = _places(net, self._A, symmetric)
-        self.refused: npt.NDArray[np.bool_] = np.zeros(len(net.net.points), dtype=bool)
+        self.refused: Flags = np.zeros(len(net.net.points), dtype=bool)
         self._since = 0
         self._number()
 
@@ -358,7 +359,7 @@ class Condensed:
         return True
 
 
-def _pattern(A: PETSc.Mat) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _pattern(A: PETSc.Mat) -> tuple[Integers, Integers]:
     """Rows and columns of the blocks of a matrix on one rank, as they are stored."""
     starts, columns = A.getRowIJ(False, True)
     rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
@@ -377,7 +378,7 @@ def _places(net: Discretisation, A: PETSc.Mat, symmetric: bool) -> dict[str, npt
     return places
 
 
-def _stored_blocks(A: PETSc.Mat) -> npt.NDArray[np.float64]:
+def _stored_blocks(A: PETSc.Mat) -> Array:
     """The values of a matrix on one rank as they are stored: by blocks, each by columns."""
     kind = "SBAIJ" if A.getType().endswith("sbaij") else "BAIJ"
     values = ctypes.POINTER(ctypes.c_double)()

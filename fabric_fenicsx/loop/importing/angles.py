@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from ...arrays import Array
+from ...arrays import Array, Integers
 from ...errors import InputError
 from ...inputs.exports.numbers import numbers
 from .columns import columns_of, converted, decimal_of, tables_of
@@ -44,7 +43,7 @@ class _Frames:
     number: Array
     time: Array
     angle: Array
-    points: npt.NDArray[np.int64]
+    points: Integers
     heading: Taken
     box: tuple[float, float, float, float]
 

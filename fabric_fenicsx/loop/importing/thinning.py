@@ -5,9 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from ...arrays import Array
+from ...arrays import Array, Integers
 
 __all__ = ["thinned"]
 
@@ -16,7 +15,7 @@ TOLERANCE = 0.005
 """Share of the travel's range within which a straight line is followed."""
 
 
-def thinned(time: Array, travel: Array, count: int) -> npt.NDArray[np.int64]:
+def thinned(time: Array, travel: Array, count: int) -> Integers:
     """Readings to keep, about ``count``: even in travel, in holds even in time.
 
     The travel over time is a polygon (Ramer, Comput. Graph. Image Process. 1, 1972; Douglas &
@@ -54,7 +53,7 @@ def thinned(time: Array, travel: Array, count: int) -> npt.NDArray[np.int64]:
     return np.unique(np.concatenate(kept))
 
 
-def _corners(time: Array, travel: Array, tolerance: float) -> npt.NDArray[np.int64]:
+def _corners(time: Array, travel: Array, tolerance: float) -> Integers:
     """Corners of the polygon that no reading is farther from than the tolerance, in travel."""
     corners, open_ = {0, len(time) - 1}, [(0, len(time) - 1)]
     while open_:

@@ -6,10 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
-from ...arrays import Array
+from ...arrays import Array, Flags, Integers
 
 __all__ = ["ImportedRun", "Taken", "Wishes"]
 
@@ -89,12 +86,12 @@ class ImportedRun:
     path: Path
     label: str
     columns: dict[str, Array]
-    lines: npt.NDArray[np.int64]
+    lines: Integers
     taken: list[Taken]
     notes: list[str]
     frames: Array | None = None
 
-    def keep(self, kept: npt.NDArray[np.bool_], why: str) -> None:
+    def keep(self, kept: Flags, why: str) -> None:
         """Keep some readings, and say why the others, if there are any, are dropped."""
         lines = self.lines[~kept]
         if not len(lines):

@@ -11,10 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from ...arrays import Array, Flags
+from ...arrays import Array, Flags, Integers
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Parameter, Variant
@@ -255,9 +254,7 @@ class _Model:
             self._cache[key] = found
         return self._cache[key]
 
-    def _columns(
-        self, x: Array, slopes: Mapping[str, Array], specimens: npt.NDArray[np.int64]
-    ) -> Array:
+    def _columns(self, x: Array, slopes: Mapping[str, Array], specimens: Integers) -> Array:
         """Derivatives in common parameters and in these specimens' deviations, (n, n_columns)."""
         columns = [slopes[name] for name in self._names]
         value = dict(zip(self._names, x, strict=False))

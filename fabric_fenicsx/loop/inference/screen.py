@@ -18,10 +18,9 @@ from functools import cached_property
 from itertools import combinations, product
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 
-from ...arrays import Array
+from ...arrays import Array, Flags, Integers
 from ..copies import in_copies
 from .effects import Effect, Variant
 from .first_order import Combination, Signature, ToFirstOrder
@@ -29,7 +28,7 @@ from .fitted import Fit
 
 __all__ = ["Screen", "Signatures"]
 
-Places = npt.NDArray[np.int64]
+Places = Integers
 Signatures = Mapping[Effect, Mapping[Variant, Sequence[Signature]]]
 
 #: Share of a column that must be left for it to have a signature of its own: round-off.
@@ -292,7 +291,7 @@ class Screen:
         found = in_copies(lambda part: self._solved(places[part], gram, own[part]), parts)
         return np.concatenate(found)
 
-    def _columns_of(self, places: Places) -> npt.NDArray[np.bool_]:
+    def _columns_of(self, places: Places) -> Flags:
         """Which columns some places are those of; of none the last, which is not looked at."""
         used = np.zeros(self._left.shape[1], dtype=bool)
         used[places] = True

@@ -21,11 +21,10 @@ from functools import cache
 from math import comb
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import savgol_coeffs
 from scipy.stats import chi2
 
-from ...arrays import Array
+from ...arrays import Array, Flags
 
 __all__ = ["Smoothed", "contradicted", "mean_of", "smoothed", "window_of"]
 
@@ -103,7 +102,7 @@ def window_of(lines: Sequence[Array]) -> int:
     found = _of_differences(lines)
     if found is None:
         return 1
-    chances = {n: _compared(found.r, found.count, 0.0, n, False, TIMES).chance for n in (1, *MEANS)}
+    chances = {n: found.chance(n) for n in (1, *MEANS)}
     best = max(chances, key=lambda n: chances[n])
     return best if chances[best] > max(AGREES, LIKELIER * chances[1]) else 1
 
@@ -123,9 +122,7 @@ def contradicted(way: Smoothed, lines: Sequence[Array], quantum: float) -> bool:
     found = _of_differences(lines)
     if found is None or found.variance < ROUGHER * quantum**2 / 12.0:
         return False
-    white = _compared(found.r, found.count, 0.0, 1, False, TIMES).chance
-    so = _compared(found.r, found.count, 0.0, way.window, way.parabola, TIMES).chance
-    return white > max(AGREES, LIKELIER * so)
+    return found.chance(1) > max(AGREES, LIKELIER * found.chance(way.window, way.parabola))
 
 
 def mean_of(values: Array, window: int) -> Array:
@@ -153,6 +150,10 @@ class _Differences:
     count: int
     variance: float
 
+    def chance(self, window: int, parabola: bool = False) -> float:
+        """Of these, where the readings were smoothed so; of a window of 1 they are white."""
+        return _compared(self.r, self.count, 0.0, window, parabola, TIMES).chance
+
 
 def _of_differences(lines: Sequence[Array]) -> _Differences | None:
     """Of readings, but at corners; None where they say nothing."""
@@ -165,15 +166,13 @@ def _of_differences(lines: Sequence[Array]) -> _Differences | None:
     if sigma <= ROUND_OFF * largest or not any(own.any() for own in seen):
         # There is no noise, or steps of the readings are larger than it.
         return None
-    r, count = _correlations(lines, seen)
-    squares = sum(float(np.sum(line[own] ** 2)) for line, own in zip(lines, seen, strict=True))
-    return _Differences(r, count, squares / count / comb(2 * TIMES, TIMES))
+    r, variance = _correlations(lines, seen)
+    count = sum(int(mask.sum()) for mask in seen)
+    return _Differences(r, count, variance / comb(2 * TIMES, TIMES))
 
 
-def _correlations(
-    lines: Sequence[Array], seen: Sequence[npt.NDArray[np.bool_]]
-) -> tuple[Array, int]:
-    """Of errors so many readings apart, of those that are seen, (LAGS,), and their number."""
+def _correlations(lines: Sequence[Array], seen: Sequence[Flags]) -> tuple[Array, float]:
+    """Of errors so many readings apart, of those that are seen, (LAGS,), and their variance."""
     own = [np.where(mask, line, 0.0) for line, mask in zip(lines, seen, strict=True)]
     count = sum(int(mask.sum()) for mask in seen)
     variance = sum(float(e @ e) for e in own) / count
@@ -182,7 +181,7 @@ def _correlations(
         pairs = sum(int((mask[lag:] & mask[:-lag]).sum()) for mask in seen)
         return sum(float(e[lag:] @ e[:-lag]) for e in own) / max(pairs, 1)
 
-    return np.array([apart(lag) for lag in _LAG]) / variance, count
+    return np.array([apart(lag) for lag in _LAG]) / variance, variance
 
 
 def _compared(

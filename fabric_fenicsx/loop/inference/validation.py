@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from ...arrays import Flags
+from ...arrays import Array, Flags, Integers
 from ...errors import SolveError
 from .criteria import CRITERIA
 from .effects import Parameter, Variant
@@ -45,7 +44,7 @@ class CrossValidation:
             has no solution there.
     """
 
-    off: npt.NDArray[np.float64]
+    off: Array
     predictive: float
     beside: float
     uncertain: float
@@ -75,7 +74,7 @@ def stretches(readings: Readings, rows: Flags) -> list[Flags]:
     return [part == k for k in range(CRITERIA.blocks) if (part == k).any()]
 
 
-def parts_by(number: npt.NDArray[np.int64], rows: Flags) -> list[Flags]:
+def parts_by(number: Integers, rows: Flags) -> list[Flags]:
     """Fitted readings in parts of one run, specimen or folder each, by its number, (n,)."""
     return [rows & (number == k) for k in np.unique(number[rows])]
 
@@ -179,9 +178,7 @@ def has_own(variants: Sequence[Variant]) -> bool:
     return any(p.run is not None for v in variants for p in v.parameters)
 
 
-def _within(
-    variants: Sequence[Variant], readings: Readings, rows: npt.NDArray[np.bool_]
-) -> tuple[Variant, ...]:
+def _within(variants: Sequence[Variant], readings: Readings, rows: Flags) -> tuple[Variant, ...]:
     """The same without the parameters of runs and specimens that have none of these readings."""
     runs, specimens = (np.unique(of[rows]) for of in (readings.run, readings.specimen))
 

@@ -8,7 +8,6 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ...arrays import Array, Integers
 from ...inputs.parameters import Parameter
@@ -175,7 +174,7 @@ def last_run(before: Sequence[float] | Array, fitted: Sequence[int] | Array) -> 
     return float(every.max()) if every[fitted].max() >= FEWEST_BEFORE else 0.0
 
 
-def earlier_alike(numbers: Sequence[int] | npt.NDArray[np.int64]) -> list[int]:
+def earlier_alike(numbers: Sequence[int] | Integers) -> list[int]:
     """How many of those before each are the same."""
     listed = list(numbers)
     return [listed[:k].count(own) for k, own in enumerate(listed)]

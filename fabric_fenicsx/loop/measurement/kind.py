@@ -7,10 +7,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-from ...arrays import Array
+from ...arrays import Array, Flags
 from ...inputs.groups import Keys
 from ...inputs.tables import Column
 from ..inference.effects import Variant
@@ -20,7 +17,7 @@ from .schema import Measurement, RunKeys
 
 __all__ = ["Kind", "MadeUp", "Mistake", "called_later"]
 
-Mistake = tuple[str, npt.NDArray[np.bool_], str]
+Mistake = tuple[str, Flags, str]
 """A column, where its readings are wrong, (n,), and what is allowed there."""
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ..inference.criteria import CRITERIA
 from ..inference.diagnosis import Diagnosis
 from ..inference.fitted import Fit
@@ -85,7 +85,7 @@ def correlations(model: Fit) -> list[tuple[str, str, float]]:
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
 
-def correlation_of(model: Fit, names: Sequence[str]) -> npt.NDArray[np.float64]:
+def correlation_of(model: Fit, names: Sequence[str]) -> Array:
     """Correlation of some common parameters' errors, (n, n); of what is not known, nothing."""
     place = {name: k for k, name in enumerate(model.values)}
     root = model.root[[place[name] for name in names]]

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from fabric_fenicsx.fabric.crossings import reference_angle
@@ -21,7 +20,7 @@ from fabric_fenicsx.output.surfaces import TriangleSurface
 from fabric_fenicsx.output.tool_distance import ToolDistance, deepest_penetration, tool_distance
 from fabric_fenicsx.output.wrinkles import Wave, in_plane_waves, tow_waves
 
-from ...arrays import Array
+from ...arrays import Array, Flags
 
 __all__ = ["Against", "Analysis", "Drape", "Measured", "Settings", "analysed"]
 
@@ -156,7 +155,7 @@ class Analysis:
     node_gap: ToolDistance | None
     penetration: dict[str, float]
     curvature: Array
-    hollow: npt.NDArray[np.bool_]
+    hollow: Flags
     waves: list[Wave]
     ripple: Array
     ripple_span: Array
@@ -208,7 +207,7 @@ def analysed(drape: Drape, settings: Settings) -> Analysis:
     )
 
 
-def _hollow(sheet: DrapedSheet, gap: ToolDistance, tool: Array) -> npt.NDArray[np.bool_]:
+def _hollow(sheet: DrapedSheet, gap: ToolDistance, tool: Array) -> Flags:
     """Where the tool bends towards the fabric along a tow, as the inside of a corner does."""
     at = np.arange(sheet.count)
     away = sheet.place[: sheet.count] - gap.feet[gap.nearest, at]

@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fabric_fenicsx.output.comparison import differing_keys, line_distance
 from fabric_fenicsx.output.page import finite
@@ -14,7 +13,7 @@ from fabric_fenicsx.output.pattern import area, nesting_box
 from fabric_fenicsx.output.report.analysis import Against, Analysis, Drape
 from fabric_fenicsx.output.thickness import flat_fabric
 
-from ...arrays import Array
+from ...arrays import Array, Flags
 
 __all__ = ["SCHEMA", "content"]
 
@@ -134,7 +133,7 @@ def _wrinkles(a: Analysis) -> dict[str, Any]:
     }
 
 
-def _touching(a: Analysis) -> npt.NDArray[np.bool_]:
+def _touching(a: Analysis) -> Flags:
     if a.gap is None:
         return np.zeros(a.drape.sheet.count, dtype=bool)
     return np.asarray(a.gap.distance < a.settings.smallest)

@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
-from ....arrays import Array, Flags
+from ....arrays import Array, Flags, Integers
 from ..records import Records
 
 __all__ = [
@@ -44,7 +44,7 @@ class Phase(IntEnum):
     OUT, BACK, STOPPED = range(3)
 
 
-Parted = Mapping[int, Sequence[tuple[Phase, npt.NDArray[np.int64]]]]
+Parted = Mapping[int, Sequence[tuple[Phase, Integers]]]
 """Of some runs, by number, what its crosshead does, and the points where it does."""
 
 

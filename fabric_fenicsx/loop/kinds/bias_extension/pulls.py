@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from ....arrays import Array, Flags
+from ....arrays import Array, Flags, Integers
 from ...measurement.schema import Measurement, Run
 from ..records import Records
 from .phases import (
@@ -51,7 +50,7 @@ class Pulls:
     furthest: Array
     speed: Array
     back: Flags
-    stops: npt.NDArray[np.int64]
+    stops: Integers
     holds: Array
     own_speed: Array
     goes_back: Flags
@@ -61,12 +60,12 @@ class Pulls:
 
 def pulls_of(
     runs: Sequence[tuple[Measurement, Run]],
-    parent: npt.NDArray[np.int64],
+    parent: Integers,
     D: Array,
     time: Array,
     speed: Array,
     records: Records,
-    read: npt.NDArray[np.int64],
+    read: Integers,
 ) -> Pulls:
     """What the strips of some runs are solved for; those alike once, as far as one of them goes.
 

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from ....arrays import Flags
+from ....arrays import Flags, Integers
 from ....errors import InputError
 from ....fabric.bias_strip import BiasStrip
 from ...inference.experiment import Another, Readings
@@ -57,7 +56,7 @@ class ReadTogether:
     """
 
     measurements: tuple[Measurement, ...]
-    parent: npt.NDArray[np.int64]
+    parent: Integers
     unit: float
     sigma: tuple[float, bool]
 

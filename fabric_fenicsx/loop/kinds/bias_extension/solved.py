@@ -16,9 +16,8 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ....arrays import Array
+from ....arrays import Array, Integers
 from ....errors import SolveError
 from ...copies import put_off_in_copies
 from ...measurement.schema import Measurement, Run
@@ -134,7 +133,7 @@ class SolvedStrips:
         paths: dict[Task, StripPath],
     ) -> None:
         self._runs, self._pulls, self._coarser = list(runs), pulls, coarser
-        self._groups: dict[int, npt.NDArray[np.int64]] = {}
+        self._groups: dict[int, Integers] = {}
         self._known: dict[str, list[Solved]] = {}
         self.paths = paths
         self.failed: dict[str, str] = {}
@@ -306,7 +305,7 @@ class SolvedStrips:
             ways.append(made[key])
         return Solved.along(curve, ways, self._pulls.furthest)
 
-    def _of_alike(self, run: int, path: StripPath) -> npt.NDArray[np.int64]:
+    def _of_alike(self, run: int, path: StripPath) -> Integers:
         """Groups of a run's crossings, the same for all of its paths."""
         return self._groups.setdefault(run, alike(path))
 

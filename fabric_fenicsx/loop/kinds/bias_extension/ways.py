@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
-from ....arrays import Array
+from ....arrays import Array, Integers
 from .curves import Curve
 from .phases import SIGN, Phase, Phases
 from .standing import AtRest, Hold
@@ -150,7 +149,7 @@ class Way:
         return np.asarray(self.at("rest", D, phase) + work.sum(axis=1))
 
 
-def way_of(path: StripPath, group: npt.NDArray[np.int64], curve: Curve) -> Way:
+def way_of(path: StripPath, group: Integers, curve: Curve) -> Way:
     """A path, and its way back, with its crossings in groups."""
     area, gamma = _together(path.gamma, path.area, group)
     of_travel = PchipInterpolator(path.travel, gamma)
@@ -172,7 +171,7 @@ def way_of(path: StripPath, group: npt.NDArray[np.int64], curve: Curve) -> Way:
     )
 
 
-def _stopped(path: StripPath, rest: AtRest, group: npt.NDArray[np.int64], curve: Curve) -> Stopped:
+def _stopped(path: StripPath, rest: AtRest, group: Integers, curve: Curve) -> Stopped:
     """A strip as it stands still, with its crossings in groups."""
     area, gamma = _together(rest.gamma, path.area, group)
     _, lever = _together(rest.lever, path.area, group)
@@ -181,13 +180,13 @@ def _stopped(path: StripPath, rest: AtRest, group: npt.NDArray[np.int64], curve:
     return Stopped(*each)
 
 
-def _together(values: Array, area: Array, group: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+def _together(values: Array, area: Array, group: Integers) -> tuple[Array, Array]:
     """Areas of the groups of crossings, (GROUPS,), and means over them, (n, GROUPS)."""
     whole = np.bincount(group, area, GROUPS).astype(np.float64)
     return whole, np.stack([np.bincount(group, area * row, GROUPS) / whole for row in values])
 
 
-def alike(path: StripPath) -> npt.NDArray[np.int64]:
+def alike(path: StripPath) -> Integers:
     """Group of each crossing, by its angle at the end; all groups have about the same area."""
     order = np.argsort(path.gamma[-1], kind="stable")
     share = np.cumsum(path.area[order]) / path.area.sum()

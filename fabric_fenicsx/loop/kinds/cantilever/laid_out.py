@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from ....arrays import Array
+from ....arrays import Array, Integers
 from ...measurement.readings import specimens_of
 from ...measurement.schema import Measurement
 from ..records import FEWEST_BEFORE, earlier_alike
@@ -33,7 +32,7 @@ class LaidOut:
         strips: that hang, those upside down apart from the others.
     """
 
-    run: npt.NDArray[np.int64]
+    run: Integers
     length: Array
     arc: Array
     distance: Array
@@ -45,7 +44,7 @@ class LaidOut:
 def laid_out(measurements: Sequence[Measurement]) -> LaidOut:
     """Put the readings of some folders in their order, and say what hangs for each."""
     table: list[Array] = []
-    run_of: list[npt.NDArray[np.int64]] = []
+    run_of: list[Integers] = []
     keys: list[tuple[bool, int, Tow]] = []
     specimens = specimens_of(measurements)
     number = 0
@@ -80,7 +79,7 @@ def laid_out(measurements: Sequence[Measurement]) -> LaidOut:
 def _hung(
     keys: Sequence[tuple[bool, int, Tow]],
     turned: bool,
-    run: npt.NDArray[np.int64],
+    run: Integers,
     arc: Array,
     distance: Array,
     observed: Array,

@@ -21,9 +21,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ....arrays import Array, Flags
+from ....arrays import Array, Flags, Integers
 from ....errors import SolveError
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Parameter, Variant, of_each, scaled
@@ -173,12 +172,12 @@ class Cantilever:
             return frozenset(("reading_of_run", "reading_of_length"))
         return frozenset()
 
-    def _one_overhang_each(self, of: npt.NDArray[np.int64]) -> bool:
+    def _one_overhang_each(self, of: Integers) -> bool:
         """Whether every number of the fitted readings goes with one overhang, and that with it."""
         pairs = self._overhangs_of(of)
         return all(len(np.unique(one)) == pairs.shape[1] for one in pairs)
 
-    def _overhangs_of(self, of: npt.NDArray[np.int64]) -> Array:
+    def _overhangs_of(self, of: Integers) -> Array:
         """Every number of the fitted readings with every overhang that goes with it, (2, n)."""
         rows = self.readings.fit
         return np.unique(np.stack([of[rows], self._length[rows]]), axis=1)

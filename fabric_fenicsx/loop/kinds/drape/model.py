@@ -24,11 +24,10 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import gaussian_filter
 
-from ....arrays import Array, Flags
+from ....arrays import Array, Flags, Integers
 from ....errors import SolveError
 from ....rigs.drape import DrapeCase
 from ....rigs.fabric_file import FabricFile, with_fabric
@@ -70,7 +69,7 @@ class _Sheet:
     measurement: Measurement
     x: Array
     y: Array
-    rows: npt.NDArray[np.int64]
+    rows: Integers
 
 
 class Drape:
@@ -178,7 +177,7 @@ class Drape:
         return float(np.sqrt(np.mean(self.sigma**2)))
 
     @cached_property
-    def _order(self) -> list[npt.NDArray[np.int64]]:
+    def _order(self) -> list[Integers]:
         """Rows of each run's file, from one place to the nearest that is left."""
         runs = [run.columns for m in self.measurements for run in m.runs]
         return [nearest_next(c["x_mm"], c["y_mm"]) for c in runs]
@@ -459,7 +458,7 @@ class Drape:
         return with_fabric(case, self._fabric.model_copy(update={"fabric": woven}))
 
 
-def nearest_next(x: Array, y: Array) -> npt.NDArray[np.int64]:
+def nearest_next(x: Array, y: Array) -> Integers:
     """An order of places, (n,), in which each is followed by the nearest of those left.
 
     It begins with the outermost. So stretches of readings are parts of the sheet.

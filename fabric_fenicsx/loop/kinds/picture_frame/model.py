@@ -18,10 +18,9 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from ufl import acos, sin
 
-from ....arrays import Array
+from ....arrays import Array, Flags
 from ....mechanics.scalars import derivative_of
 from ...expressions.marching import Marched, Varying
 from ...inference.effects import Effect, Variant
@@ -137,7 +136,7 @@ class PictureFrame(CrossheadTest):
         )
         return gamma, factor
 
-    def _steady(self, rows: npt.NDArray[np.bool_]) -> bool:
+    def _steady(self, rows: Flags) -> bool:
         """Whether some readings are of one way at one speed of the crosshead or of the angle."""
         rate = self._recorded.at_readings(self._kinematics(self._points, {})["rate"].value)[rows]
         speed = self._recorded.at_readings(self._points["D_rate"].value)[rows]

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
-from ....arrays import Array, Flags
+from ....arrays import Array, Flags, Integers
 
 __all__ = ["Motion", "crosshead_motion", "frame_motion", "motion"]
 
@@ -53,7 +52,7 @@ class Motion:
     time: Array
     displacement: Array
     rate: Array
-    reading: npt.NDArray[np.int64]
+    reading: Integers
     rate_error: Array
     certain: Flags
 
