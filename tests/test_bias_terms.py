@@ -165,6 +165,20 @@ def test_one_way_at_one_speed_is_one_curve(back):
     assert not BiasExtension([of_runs(run_of(force=FORCE[:29]), faster)]).alike
 
 
+def test_forces_of_one_size_one_way_at_one_speed_know_a_curve_only(back):
+    pull = run_of(force=FORCE[:29])
+    test = BiasExtension([of_runs(pull, pull)])
+    assert test.curves_only
+    assert any("not which effect makes it" in note for note in test.notes)
+    longer = run_of(force=FORCE[:29], length=250.0)
+    for more in (run_of(force=FORCE[:29], speed=5.0), longer):
+        assert not BiasExtension([of_runs(pull, more)]).curves_only
+    assert not back.curves_only
+    # Each laboratory's are on a curve of their own.
+    assert BiasExtension([of_runs(pull), of_runs(longer)]).curves_only
+    assert not BiasExtension([with_angles(of_runs(pull), every=1)]).curves_only
+
+
 @pytest.mark.slow
 def test_what_tells_friction_from_a_curve():
     """A way back does; the way out again, by whatever reads it, knows what it knew."""

@@ -201,6 +201,7 @@ REPORT = {
     "best": None,
     "instead": [],
     "curve": None,
+    "may_be": [],
     "holdout_expected": 0.05,
     "scatter": {},
     "in_scatter": [],
@@ -280,6 +281,13 @@ def test_the_headline_claims_no_more_than_readings_know_of_a_term():
     assert "depends on the" not in said and "acts on the moment (discovered_1) does" in said
     assert "not on which of rate, direction, path and time it depends" in said
     assert "It may be crossover_friction in a form" in said
+
+
+def test_what_readings_on_curves_may_be():
+    """Effects that come nearest are said, none of them as found."""
+    said = headline(REPORT | {"verdict": "unexplained", "may_be": ["crossover_slip", "clamp_slip"]})
+    assert "do not know what makes it" in said
+    assert said.endswith("Nearest to it is crossover_slip or clamp_slip.")
 
 
 def test_the_headline_says_what_noise_is():

@@ -337,7 +337,7 @@ def test_one_rate_alone_knows_a_curve_and_not_what_makes_it():
     """
     truth, found = diagnosed(6, "shear_locking-square")
     assert found.verdict == "unexplained" and found.effects == ()
-    assert found.curve is not None and "shear_locking" in found.of_the_curve
+    assert found.curve is not None and "shear_locking" in found.may_be
     # The moment at that rate, k1 γ + k3 γ³ + locking + c1 γ̇, within the curve's band.
     p, own = truth.baseline, truth.effects[0]["parameters"]
     x = found.curve.at

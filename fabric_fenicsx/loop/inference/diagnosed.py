@@ -58,7 +58,7 @@ def diagnosed(
     judged = final if verdict != "unexplained" else nearest
     misfit = judge.misfit(judged)
     curve = _curve(judge, judged) if verdict == "unexplained" else None
-    of_the_curve = _of_the_curve(levels) if curve is not None else ()
+    may_be = _may_be(levels) if verdict == "unexplained" and experiment.curves_only else ()
     instead = models_instead(judge, levels, chosen) if verdict == "unexplained" else {}
     rivals = rivals_of(models, final, choice.in_their_place)
     one_more = len(chosen.effects) + 1
@@ -85,7 +85,7 @@ def diagnosed(
         effects=models.by_strength(final),
         rivals=rivals,
         pairs=[
-            *pairs_of(models, final, rivals, of_the_curve),
+            *pairs_of(models, final, rivals, may_be),
             *pairs_of(models, chosen, in_place_of(chosen, instead), ()),
         ],
         candidates=candidates,
@@ -100,7 +100,7 @@ def diagnosed(
         criterion_before=baseline.criterion,
         criterion_after=final.criterion,
         curve=curve,
-        of_the_curve=of_the_curve,
+        may_be=may_be,
         in_scatter=tuple(in_scatter(judge, more, chosen)),
         others=errors_beside(judge, baseline.fit, final.fit, nearest.fit, misfit.noise),
         laboratories=tuple(laboratories(experiment, judged.fit, misfit.noise)),
@@ -117,8 +117,8 @@ def _curve(judge: Judge, model: Model) -> Curve | None:
     return smooth_curve(known, experiment.readings, model.fit.used, variances, judge.given)
 
 
-def _of_the_curve(levels: Sequence[Sequence[Model]]) -> tuple[str, ...]:
-    """Effects that come as near to the curve as the nearest of them."""
+def _may_be(levels: Sequence[Sequence[Model]]) -> tuple[str, ...]:
+    """Effects that come as near to what is on a curve as the nearest of them."""
     singles = levels[1] if len(levels) > 1 else []
     limit = min((m.criterion for m in singles), default=0.0) + CRITERIA.decisive
     return tuple(dict.fromkeys(m.effects[0].name for m in singles if m.criterion < limit))

@@ -139,7 +139,7 @@ class Diagnosis:
         others: errors in quantities beside the first.
         laboratories: where there are several folders, what the others say of each.
         pairs: effects that are not told apart, with the models of each that fit as well.
-        of_the_curve: effects that are such a curve, where one was looked for.
+        may_be: effects of which any may be what is left, where the readings know curves alone.
         in_scatter: effects that may be what specimens differ by in ``final``, the likeliest first.
         joined: models with what another test of the fabric found, the best first.
     """
@@ -169,7 +169,7 @@ class Diagnosis:
     criterion_after: float = float("nan")
     instead: tuple[Fit, ...] = ()
     curve: Curve | None = None
-    of_the_curve: tuple[str, ...] = ()
+    may_be: tuple[str, ...] = ()
     others: tuple[Beside, ...] = ()
     laboratories: tuple[Laboratory, ...] = ()
     pairs: list[Pair] = field(default_factory=list)

@@ -109,7 +109,7 @@ def pairs_of(
     models: Models,
     final: Model,
     rivals: Mapping[str, Sequence[str]],
-    of_the_curve: Sequence[str],
+    may_be: Sequence[str],
 ) -> list[Pair]:
     """Effects that are not told apart, each with all models that fit about as well.
 
@@ -117,11 +117,11 @@ def pairs_of(
         models: of the test.
         final: the model that was found.
         rivals: of its effects.
-        of_the_curve: effects that come as near to a curve that nothing was found in.
+        may_be: effects of which any may be what is left, where nothing was found.
     """
     by_name = {e.name: e for e in models.effects}
     pairs = [(own, other) for own, others in rivals.items() for other in others]
-    pairs += [(of_the_curve[0], other) for other in of_the_curve[1:]]
+    pairs += [(may_be[0], other) for other in may_be[1:]]
     found = []
     for own, other in pairs:
         kept = frozenset(e for e in final.effects if e.name != own)

@@ -106,6 +106,7 @@ def test_report(
         ],
         "own_of_runs": has_own(nearest.variants),
         "curve": None if d.curve is None else _curve(d),
+        "may_be": list(d.may_be),
         "holdout_source": d.holdout_source,
         "model": _numbers(d, d.final, d.holdout_after),
         "best": None if d.best is None else _numbers(d, d.best, d.holdout_best),
@@ -268,13 +269,12 @@ def _of_run(d: Diagnosis, number: int, checks: Sequence[Check]) -> dict[str, Any
 
 
 def _curve(d: Diagnosis) -> dict[str, Any]:
-    """What readings on one curve know, and which effects could have made it."""
+    """What readings on one curve know."""
     assert d.curve is not None
     return {
         "x": d.curve.x,
         "y": d.curve.y,
         "file": f"{d.experiment.test}_curve.csv",
-        "effects": list(d.of_the_curve),
         "largest_std": float(d.curve.std.max()),
     }
 

@@ -106,8 +106,13 @@ def _verdict(report: Mapping[str, Any]) -> str:
             f"angle, which the baseline is not (error {_value(report, fitted)}; {scatter}), "
             "and not what makes it."
         )
-        names = report["curve"]["effects"]
-        return text + (f" It may be {one_of(names)}." if names else "")
+        return text + (f" It may be {one_of(report['may_be'])}." if report["may_be"] else "")
+    if report["may_be"]:
+        return (
+            "The residual is not noise, and readings that go one way at one rate do not know what "
+            f"makes it: held-out error {before}; {scatter}. Nearest to it is "
+            f"{one_of(report['may_be'])}."
+        )
     nor = "and no known effect explains it, nor do several of them"
     if report["instead"]:
         nor = "and no effect is known to explain it"

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ....arrays import Array
+from ....arrays import Array, Flags
 from ....errors import SolveError
 from ....rigs.fabric_file import FabricFile
 from ...expressions.marching import Varying
@@ -59,6 +59,11 @@ __all__ = ["BiasExtension"]
 LITTLE_NET = 0.05
 #: Sets of strips of which it is kept how their crossings go.
 MOTIONS = 8
+CURVES_IN_WORDS = (
+    "The forces are of strips of one size that go one way at one speed: they know the force by the "
+    "travel, and not which effect makes it. Another size or speed, a way back, or the angles of "
+    "the middle may tell."
+)
 #: Shares of even shear that fits may begin with.
 EVEN_STARTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
@@ -77,7 +82,6 @@ class BiasExtension(CrossheadTest):
     test = "bias_extension"
     listed = BIAS_EXTENSION_EFFECTS
     one_curve = None
-    curves_only = False
     settles = True
     # It takes a dozen predictions of the force.
     gives_way = False
@@ -128,13 +132,33 @@ class BiasExtension(CrossheadTest):
 
         Each of them is then a curve of the angle, whatever else it depends on.
         """
-        speed = self._recorded.at_readings(self._points["D_rate"].value)[self.readings.fit]
-        if np.ptp(speed) > SAME_RATE * float(np.abs(speed).max()):
+        if not self._steady(self.readings.fit):
             return frozenset()
         every = (*self.effects, *self.terms)
         return frozenset(
             e.name for e in every if all(getattr(v, "laws", None) is not None for v in e.variants)
         )
+
+    def _steady(self, rows: Flags) -> bool:
+        """Whether some readings are of one way at one speed."""
+        speed = self._recorded.at_readings(self._points["D_rate"].value)[rows]
+        return bool(np.ptp(speed) <= SAME_RATE * float(np.abs(speed).max()))
+
+    @cached_property
+    def curves_only(self) -> bool:
+        """Whether each laboratory has forces alone, of one size, one way and at one speed.
+
+        These know the force by the travel; angles and other sizes may tell what makes it.
+        """
+        readings = self.readings
+        if (readings.fit & ~readings.first).any():
+            return False
+        for folder in np.unique(readings.folder[readings.fit]):
+            rows = readings.fit & (readings.folder == folder)
+            sizes = {strip_of(*self._runs[run]) for run in np.unique(readings.run[rows])}
+            if len(sizes) > 1 or not self._steady(rows):
+                return False
+        return True
 
     @property
     def curve(self) -> Curve:
@@ -496,4 +520,12 @@ class BiasExtension(CrossheadTest):
         """What a report must say of the model."""
         strips, angles = self._strips, self._together.notes
         even = [] if self._even is None else [IN_WORDS]
-        return [*strips.notes, *even, *foretold_in_words(self.foretold), *angles, *strips.left_out]
+        curves = [CURVES_IN_WORDS] if self.curves_only else []
+        return [
+            *strips.notes,
+            *curves,
+            *even,
+            *foretold_in_words(self.foretold),
+            *angles,
+            *strips.left_out,
+        ]
