@@ -197,6 +197,19 @@ def test_held_out_readings_as_noisy_as_was_stated_contradict_nothing(held, foret
     assert judge.foretells(model) is foretold
 
 
+@pytest.mark.parametrize("share", [0.0, 0.005, 0.05])
+def test_noise_in_proportion_scatters_by_chance_as_the_few_largest_readings_do(share):
+    """Its root mean square exceeds what once in a thousand is said to, about once in a thousand."""
+    force = 20.0 * np.linspace(0.05, 1.0, 90) ** 3
+    data, noise = readings(force), Noise(0.02, share)
+    model = SimpleNamespace(estimate=SimpleNamespace(variances=Variances(noise)))
+    judge = Judge(Linear(data, {"a": force}, ("a",)), [])
+    limit = judge.by_chance(model, 90, data.fit)
+    draws = noise.sigma(data) * np.random.default_rng(5).normal(size=(20000, 90))
+    beyond = np.mean(np.sqrt(np.mean(draws**2, axis=1)) > limit * noise.typical(data, data.fit))
+    assert 0.3e-3 < beyond < 4e-3
+
+
 @pytest.mark.parametrize(
     ("correlation", "beside", "alone"), [(0.1, 0, 0), (0.3, 1, 0), (0.9, 1, 1)]
 )
