@@ -5,6 +5,7 @@ and the force is that of k1 γ + k3 γ³ + c1 γ̇ with the frame's own γ. In t
 that the readings just after a turn miss the dashpot's force.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -111,6 +112,23 @@ def test_play_is_found_by_what_happens_at_the_turns(form, behind, ahead):
     assert found.holdout_after < 1.15 * SIGMA
     # Without the play just these stand out as outliers would.
     assert not found.outliers.any()
+
+
+def test_of_shearing_one_way_an_even_moment_has_an_odd_one_as_its_rival():
+    """And its first power is the spring of the baseline; neither where the frame goes both ways."""
+    out = measured()
+    both = [
+        replace(run, columns=run.columns | {"displacement_mm": run.columns["displacement_mm"] - 5})
+        for run in out.runs
+    ]
+    rivals = {"tension_coupling", "odd_moment_of_angle"}
+    for measurement, one_way in ((out, True), (replace(out, runs=tuple(both)), False)):
+        test = PictureFrame([measurement])
+        (even,) = (e for e in test.effects if e.name == "tension_coupling")
+        first = [p for v in even.variants for p in v.parameters if p.name == "k_even1_N"]
+        assert test.alike == (rivals if one_way else set())
+        assert ("tension_coupling" in test.imitated) is one_way
+        assert bool(first) is not one_way
 
 
 GAP = {"wide": 2.9, "c1": 0.1 * C1}

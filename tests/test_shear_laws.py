@@ -23,6 +23,7 @@ from fabric_fenicsx.mechanics.laws.maxwell import Maxwell
 from fabric_fenicsx.mechanics.laws.pressed import PressedFriction
 from fabric_fenicsx.mechanics.laws.sliding import SlidingFriction
 from fabric_fenicsx.mechanics.laws.springs import PolynomialSpring
+from fabric_fenicsx.mechanics.laws.stribeck import StribeckFriction
 from fabric_fenicsx.mechanics.laws.tabulated import TabulatedDashpot, TabulatedSpring
 from fabric_fenicsx.rigs.simulation import simulate
 from fabric_fenicsx.solving.model import Model, Support
@@ -243,6 +244,17 @@ def test_friction_that_grows_as_the_angle_presses_the_tows_together():
         end = np.sign(new - old) * limit * (1.0 + 2.0 * abs(new))
         M.append(end + (M[-1] - end) * np.exp(-abs((new - old) * limit / 0.1 / end)))
     assert moments(DahlFriction(limit, 0.1, growth=2.0), path) == pytest.approx(M[1:])
+
+
+@pytest.mark.parametrize("length", [1.0, 0.05])
+def test_friction_that_is_weaker_at_a_higher_rate(length):
+    """m_c (1 + b exp(−|γ̇|/v)) times Dahl's of limit 1, by hand."""
+    path = [0.05, 0.5, 0.25, -0.5]
+    law = StribeckFriction(2.0, 0.1, excess=0.8, weakening_rate=2.0)
+    rates = np.abs(np.diff([0.0, *path])) / length
+    sticks = moments(DahlFriction(1.0, 0.1), path)
+    expected = 2.0 * (1.0 + 0.8 * np.exp(-rates / 2.0)) * sticks
+    assert moments(law, path, length=length) == pytest.approx(expected)
 
 
 def test_friction_of_tows_that_shear_presses_together_slides_after_as_much_shear():

@@ -874,6 +874,13 @@ def test_of_shearing_one_way_an_even_moment_is_an_odd_one(ends, there):
     assert "odd_moment_of_angle" in names
 
 
+def test_what_never_turns_has_no_moment_of_one_way_alone():
+    """It is one of the angle there."""
+    for speeds, there in (((-1.0, 0.5), True), ((0.0, 1.0), False), ((-1.0, 0.0), False)):
+        ends = {"displacement": (0.0, 1.0), "speed": speeds}
+        assert ("one_way_moment_of_angle" in {term.name for term in terms(RANGES, ends)}) is there
+
+
 @pytest.mark.parametrize(("ends", "there"), [((-0.6, 1.0), True), ((-0.1, 1.0), False)])
 def test_one_way_of_shearing_may_have_its_own_moment(ends, there):
     """Where the frame went far to both sides: else it is a moment of the angle like any other."""

@@ -80,7 +80,7 @@ class EvenSpring(CrossingLaw):
     law = "even_spring"
     interlaced = False
     of_fabric = False
-    forms = (_even(2), _even(1), _even(4), _even(1, 2, 4))
+    forms = (_even(2), _even(1), _even(4), _even(2, 4), _even(1, 2, 4))
 
     def moment(self, at: Crossing) -> Any:
         """The power of |γ|."""

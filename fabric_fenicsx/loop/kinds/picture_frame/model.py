@@ -12,9 +12,9 @@ classes that the whole net takes; how far tows that bend between crossings leave
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from math import pi, sqrt
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ from .motion import Motion, frame_motion
 from .products import products
 from .rig_products import rig_products
 from .run_terms import run_terms
-from .terms import ranges_of, terms
+from .terms import SLIGHTLY, both_ways, ranges_of, terms
 from .variant import FrameVariant
 
 __all__ = ["PictureFrame"]
@@ -42,6 +42,8 @@ __all__ = ["PictureFrame"]
 
 #: Share by which speeds may differ that are one.
 SAME_RATE = 0.1
+#: What the frame adds to an odd law of the weave, the term that is an odd law, and an amplitude.
+EVEN, ODD, FIRST_POWER = "tension_coupling", "odd_moment_of_angle", "k_even1_N"
 
 
 class PictureFrame(CrossheadTest):
@@ -49,14 +51,24 @@ class PictureFrame(CrossheadTest):
 
     test = "picture_frame"
     listed = PICTURE_FRAME_EFFECTS
-    # Of specimens that were each mounted in a way of their own the force is nearly offset by run.
-    # A friction whose stick is bent all the way looks like what a large shear leaves for good.
-    imitated: Mapping[str, tuple[str, ...]] = MappingProxyType(
-        {
+
+    @cached_property
+    def imitated(self) -> Mapping[str, tuple[str, ...]]:  # type: ignore[override]
+        """See Experiment.
+
+        Of specimens that were each mounted in a way of their own the force is nearly offset by run.
+        A friction whose stick is bent all the way looks like what a large shear leaves for good.
+        """
+        of_one_way = {} if self._both_ways else {EVEN: (ODD,)}
+        return of_one_way | {
             "load_drift": ("travel_of_run",),
             "crossover_friction": ("rest_moment_of_largest_angle",),
         }
-    )
+
+    @cached_property
+    def alike(self) -> frozenset[str]:  # type: ignore[override]
+        """Of shearing one way an even moment is an odd one, whatever its curve."""
+        return frozenset() if self._both_ways else frozenset({EVEN, ODD})
 
     def _motion(self, measurement: Measurement, run: Run) -> Motion:
         """Driven at a constant speed or a constant rate of shear."""
@@ -77,6 +89,17 @@ class PictureFrame(CrossheadTest):
         self._rig = {name: recorded.each(lengths) for name, lengths in self._lengths.items()}
         #: What specimens went through before these runs, the same arrays each time; see Marched.
         self._earlier: dict[str, Array] = {}
+
+    @cached_property
+    def _both_ways(self) -> bool:
+        return both_ways(self._ends(), SLIGHTLY)
+
+    def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
+        """Of shearing one way an even first power of the angle is the baseline's spring."""
+        if effect.name == EVEN and not self._both_ways:
+            told = [v for v in effect.variants if FIRST_POWER not in {p.name for p in v.parameters}]
+            effect = replace(effect, variants=tuple(told))
+        return super()._scaled(effect, shares)
 
     @cached_property
     def curves_only(self) -> bool:

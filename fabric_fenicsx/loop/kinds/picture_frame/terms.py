@@ -41,7 +41,7 @@ from .shapes import (
 )
 from .variant import FrameVariant
 
-__all__ = ["as_reported", "both_ways", "of_a_law", "ranges_of", "remembering", "terms"]
+__all__ = ["SLIGHTLY", "as_reported", "both_ways", "of_a_law", "ranges_of", "remembering", "terms"]
 
 #: As far to either side, as a share of the largest displacement, one of them may have its own.
 SIDE = 0.2
@@ -112,7 +112,7 @@ def terms(
     largest = ranges_of(ranges)
     return [
         *_of_the_crossing(largest, both_ways(ends, SLIGHTLY)),
-        *_of_one_way(largest, both_ways(ends)),
+        *_of_one_way(largest, both_ways(ends), turns=_turns(ends)),
         *_flowing(largest),
         *_lagging(largest),
         *rig_terms(largest, ends, specimens, rig, runs),
@@ -200,16 +200,24 @@ def both_ways(ends: Ends, side: float = SIDE) -> bool:
     return low <= -side and high >= side
 
 
-def _of_one_way(largest: Mapping[str, float], both: bool) -> Iterator[Effect]:
+def _turns(ends: Ends) -> bool:
+    """Whether the crosshead went both out and back."""
+    slowest, fastest = ends.get("speed", (-1.0, 1.0))
+    return slowest < 0.0 < fastest
+
+
+def _of_one_way(largest: Mapping[str, float], both: bool, *, turns: bool) -> Iterator[Effect]:
     """What only one way of shearing has, as a stitch that it draws tight; if there were both.
 
     And what there is only while that opens, or closes: edges of tows that catch on the way there.
+    Where it does but one of these, that is what there is anyway.
     """
+    ways = ONE_WAY if both else ("opening", "closing")
     # A line and a cube are the baseline's and an even moment's.
     chosen = ("2 coefficients", "step", "saturation", "corner")
     kinds: tuple[tuple[str, Iterable[str], tuple[str, ...]], ...] = (
         ("one_sided_moment_of_angle", ONE_SIDED if both else (), ()),
-        ("one_way_moment_of_angle", ONE_WAY if both else ("opening", "closing"), ("direction",)),
+        ("one_way_moment_of_angle", ways if turns else (), ("direction",)),
     )
     for name, bases, also in kinds:
         drawn = [one for one in shapes(name, 4) if one[0] in chosen] + [*bumps(name)]
