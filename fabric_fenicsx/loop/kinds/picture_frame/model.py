@@ -92,7 +92,8 @@ class PictureFrame(CrossheadTest):
 
     @cached_property
     def _both_ways(self) -> bool:
-        return both_ways(self._ends(), SLIGHTLY)
+        """Whether what is fitted is; without readings nothing says that it is not."""
+        return not self.readings.fit.any() or both_ways(self._ends(), SLIGHTLY)
 
     def _scaled(self, effect: Effect, shares: Mapping[str, float]) -> Effect:
         """Of shearing one way an even first power of the angle is the baseline's spring."""
