@@ -18,7 +18,7 @@ from scipy.stats import beta
 
 DOCS = Path(__file__).parents[1] / "docs"
 #: First and last outsider of each group.
-GROUPS = ((1, 5), (6, 10), (11, 15), (16, 20), (21, 24), (25, 28))
+GROUPS = ((1, 5), (6, 10), (11, 15), (16, 20), (21, 24), (25, 29))
 #: Kinds of sets, how they are called, and the share that is aimed at.
 KINDS = {
     "listed": ("one listed effect", 0.9),
