@@ -59,6 +59,7 @@ __all__ = ["BiasExtension"]
 LITTLE_NET = 0.05
 #: Sets of strips of which it is kept how their crossings go.
 MOTIONS = 8
+#: What is said of strips that know a curve only.
 CURVES_IN_WORDS = (
     "The forces are of strips of one size that go one way at one speed: they know the force by the "
     "travel, and not which effect makes it. Another size or speed, a way back, or the angles of "
