@@ -204,7 +204,7 @@ def test_noise_in_proportion_scatters_by_chance_as_the_few_largest_readings_do(s
     data, noise = readings(force), Noise(0.02, share)
     model = SimpleNamespace(estimate=SimpleNamespace(variances=Variances(noise)))
     judge = Judge(Linear(data, {"a": force}, ("a",)), [])
-    limit = judge.by_chance(model, 90, data.fit)
+    limit = judge.by_chance(model, 90 * noise.evenness(data, data.fit))
     draws = noise.sigma(data) * np.random.default_rng(5).normal(size=(20000, 90))
     beyond = np.mean(np.sqrt(np.mean(draws**2, axis=1)) > limit * noise.typical(data, data.fit))
     assert 0.3e-3 < beyond < 4e-3

@@ -17,7 +17,13 @@ COUNTERPARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "coulomb": SLIDING,
         "tanh": SLIDING,
         "stick": ("Coulomb with stick", "two sliders"),
-        "dahl": ("Dahl", "Dahl, growing with the angle", "Dahl, with an exponent"),
+        "dahl": (
+            "Dahl",
+            "Dahl, growing with the angle",
+            "Dahl, growing with a power of the angle",
+            "Dahl, with an exponent",
+            "Dahl, weaker with the rate",
+        ),
     },
     "crossover_relaxation": {
         "short": ("one branch", "one branch, cubic", "two branches"),
@@ -36,8 +42,8 @@ COUNTERPARTS: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "tension_coupling": {
         "absolute": ("power 1",),
-        "square": ("power 2",),
-        "quartic": ("power 4",),
+        "square": ("power 2", "powers 2, 4"),
+        "quartic": ("power 4", "powers 2, 4"),
     },
     "crosshead_backlash": {
         "free": ("free on the way out", "gap that the force closes"),

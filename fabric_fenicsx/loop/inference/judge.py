@@ -263,7 +263,9 @@ class Judge(HeldOut):
                 return False
         allowed = CRITERIA.near if found.whiteness.structured else CRITERIA.scatter
         allowed = CRITERIA.roughly if roughly else allowed
-        return left <= found.noise * max(allowed, self.by_chance(model, freedom, used))
+        # Readings that scatter most make most of what is left.
+        equal = freedom * model.estimate.variances.noise.evenness(self._readings, used)
+        return left <= found.noise * max(allowed, self.by_chance(model, equal))
 
     def explains(self, model: Model, baseline: Model, *, roughly: bool = False) -> bool:
         """Whether a model leaves noise, in what it was fitted to and in what it was not.
@@ -332,7 +334,7 @@ class Judge(HeldOut):
         out = self.foretold_rows(model)
         if out.any():
             error = model.fit.predictive_rms(out)
-            rows, count = out, int(out.sum())
+            count = int(out.sum())
             # One specimen's deviation is a single number, however many readings share it.
             known = self._known_of(model)
             expected = self.expected(model.fit, out, self.misfit(model).noise, known)
@@ -346,11 +348,11 @@ class Judge(HeldOut):
             found = self.left_out(model.fit)
             # A term that nobody has fitted there may be anything, which is no prediction.
             error = found.predictive if _terms_of(model) else found.beside
-            rows, count = model.fit.used, int(model.fit.used.sum())
+            count = int(model.fit.used.sum())
         noise = model.fit.variances.noise.typical(self._readings, model.fit.used)
         allowed = CRITERIA.roughly if roughly else CRITERIA.scatter
         # Held-out readings are compared with a noise that few others may be all that is known of.
-        limit = max(allowed, self.by_chance(model, count, rows, of_others=bool(out.any())))
+        limit = max(allowed, self.by_chance(model, count, of_others=bool(out.any())))
         # Noise of somewhat more than was stated is as stated; of less it makes no error larger.
         held_out = error * min(noise, self._as_stated(noise))
         # What is within the noise as it was stated contradicts nothing, however little others do.
@@ -388,24 +390,18 @@ class Judge(HeldOut):
         slack = 1.0 + 0.5 / np.sqrt(max(int(model.fit.used.sum()), 1))
         return bool(mine * own[0] < slack * other * own[1])
 
-    def by_chance(self, model: Model, count: int, rows: Flags, *, of_others: bool = False) -> float:
+    def by_chance(self, model: Model, count: float, *, of_others: bool = False) -> float:
         """Scatter over noise that is exceeded by chance once in a thousand.
-
-        A sum of squares whose expectations sigma^2 differ is about one of as many equal ones as
-        have its variance, (sum sigma^2)^2 / sum sigma^4 (Satterthwaite, Biometrics Bull. 2, 1946).
 
         Args:
             model: that leaves it.
-            count: of readings, or what parameters leave of it.
-            rows: the readings, (n,).
+            count: of readings that scatter alike, or what parameters leave of it.
             of_others: whether the noise is known from others alone, if it was not stated (F); up
                 to twice that.
         """
-        noise = model.estimate.variances.noise
-        share = (1.0 - noise.correlation) / (1.0 + noise.correlation)
-        variances = noise.sigma(self._readings)[rows] ** 2
-        even = float(np.mean(variances) ** 2 / np.mean(variances**2))
-        independent = max(count * share * even, 1.0)
+        phi = model.estimate.variances.noise.correlation
+        share = (1.0 - phi) / (1.0 + phi)
+        independent = max(count * share, 1.0)
         if of_others and self.given is None:
             known = max(model.fit.freedom * share, 1.0)
             ratio = float(np.sqrt(f_ratio.isf(1e-3, independent, known)))

@@ -90,6 +90,15 @@ class Noise:
         """Root mean square over some readings: what is printed, and judged by."""
         return float(np.sqrt(np.mean((self.sigma(readings) * readings.weight)[rows] ** 2)))
 
+    def evenness(self, readings: Readings, rows: Flags) -> float:
+        """Share of some readings that, all alike, would have sums of squares as sure as theirs.
+
+        A sum of squares whose expectations sigma^2 differ is about one of as many equal ones as
+        have its variance, (sum sigma^2)^2 / sum sigma^4 (Satterthwaite, Biometrics Bull. 2, 1946).
+        """
+        variances = (self.sigma(readings) * readings.weight)[rows] ** 2
+        return float(np.mean(variances) ** 2 / np.mean(variances**2))
+
     def whitener(self, readings: Readings, rows: Flags) -> Whitener:
         """For some readings."""
         at = np.flatnonzero(rows)

@@ -13,11 +13,13 @@ from ...arrays import Array
 from ..inference.experiment import Readings
 from .recorded_rig import RecordedRig
 
-__all__ = ["LITTLE", "ends_of", "ranges_of"]
+__all__ = ["LITTLE", "at_one_rate", "ends_of", "ranges_of"]
 
 
 LITTLE = 0.05
 """Share of the largest size below which a reading on the other side of 0 is none."""
+SAME_RATE = 0.1
+"""Share by which rates may differ that are one."""
 
 
 def ranges_of(
@@ -52,6 +54,11 @@ def ranges_of(
         "force": force,
         "force_rate": force / max(float(np.median(duration)), 1e-9),
     }
+
+
+def at_one_rate(rates: Array) -> bool:
+    """Whether some rates, or speeds, are one, to the same side; not of none."""
+    return len(rates) > 0 and bool(np.ptp(rates) <= SAME_RATE * float(np.abs(rates).max()))
 
 
 def ends_of(recorded: RecordedRig, readings: Readings) -> dict[str, tuple[float, float]]:

@@ -30,9 +30,9 @@ from ...inference.effects import Effect, Variant
 from ...inference.experiment import Readings
 from ...measurement.schema import Measurement, Run
 from ..crosshead import CrossheadTest
-from ..picture_frame.model import SAME_RATE
 from ..picture_frame.motion import Motion, crosshead_motion
 from ..picture_frame.variant import FrameVariant
+from ..ranges import at_one_rate
 from ..recorded_rig import RecordedRig
 from ..records import Records
 from .curves import KNOTS, Curve, Moment, at_knots
@@ -143,7 +143,7 @@ class BiasExtension(CrossheadTest):
     def _steady(self, rows: Flags) -> bool:
         """Whether some readings are of one way at one speed."""
         speed = self._recorded.at_readings(self._points["D_rate"].value)[rows]
-        return bool(np.ptp(speed) <= SAME_RATE * float(np.abs(speed).max()))
+        return at_one_rate(speed)
 
     @cached_property
     def curves_only(self) -> bool:

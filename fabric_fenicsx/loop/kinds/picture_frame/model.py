@@ -27,6 +27,7 @@ from ...inference.effects import Effect, Variant
 from ...inference.experiment import OneCurve
 from ...measurement.schema import Measurement, Run
 from ..crosshead import CrossheadTest
+from ..ranges import at_one_rate
 from ..recorded_rig import RecordedRig
 from ..records import last_run
 from .effects import PICTURE_FRAME_EFFECTS
@@ -40,8 +41,6 @@ from .variant import FrameVariant
 __all__ = ["PictureFrame"]
 
 
-#: Share by which speeds may differ that are one.
-SAME_RATE = 0.1
 #: What the frame adds to an odd law of the weave, the term that is an odd law, and an amplitude.
 EVEN, ODD, FIRST_POWER = "tension_coupling", "odd_moment_of_angle", "k_even1_N"
 
@@ -164,9 +163,7 @@ class PictureFrame(CrossheadTest):
         """Whether some readings are of one way at one speed of the crosshead or of the angle."""
         rate = self._recorded.at_readings(self._kinematics(self._points, {})["rate"].value)[rows]
         speed = self._recorded.at_readings(self._points["D_rate"].value)[rows]
-        return len(rate) > 0 and any(
-            np.ptp(v) <= SAME_RATE * float(np.abs(v).max(initial=0.0)) for v in (speed, rate)
-        )
+        return at_one_rate(speed) or at_one_rate(rate)
 
     def added_alike(self, variant: Variant, variants: Sequence[Variant]) -> bool:
         """Where moments and readings add up, at the recorded angles; see Experiment."""
